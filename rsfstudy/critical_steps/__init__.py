@@ -1,4 +1,4 @@
-"""Critical steps, the smallest steps of the load that trigger an instability.
+"""Critical steps: the smallest load steps that trigger an instability.
 
 The package contains the measures ``CriticalStep`` and ``Triggered`` and the algorithms that the
 measures use: the critical path, the motion after a step, and a shooting method. The package never

@@ -1,11 +1,12 @@
 """Critical paths, which are motions that just reach the instability norm.
 
 The main class is ``CriticalPath``. At the end of a critical path, ln V equals the instability norm
-and the time derivative of ln V is zero. With these two conditions, the stress at the end follows
-from a scalar equation. The path is integrated backwards in time from its end, which is called the
-tangency point. Neighbouring paths converge backwards in time. A few short integrations with a
-moderate tolerance are therefore accurate to many digits. An integration forwards in time would
-amplify every error. Gu et al. [1]_ derive the critical path under the slip law.
+and the time derivative of ln V is zero. These two conditions determine the stress at the end of the
+path, which is computed from a scalar equation. The path is integrated backwards in time from its
+end, which is called the tangency point. When neighbouring paths are integrated backwards in time,
+they converge. A few short integrations with a moderate tolerance therefore give results that are
+accurate to many digits. An integration forwards in time would amplify every error. Gu et al. [1]_
+derive the critical path under the slip law.
 
 A critical path has two unknowns, the spring stress and one state. These two unknowns are sufficient
 if the effect of inertia is small at the instability norm. Inertia has no effect at an instant at
@@ -57,7 +58,7 @@ _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM = 1e-6
 
 
 class CriticalPath(NamedTuple):
-    """Path that touches the instability norm, in a scene with one state.
+    """Critical path of a scene with one state, which touches the instability norm.
 
     Parameters
     ----------
@@ -180,7 +181,8 @@ class CriticalPath(NamedTuple):
         tolerance : float
             Local error tolerance of the integration.
         crossing_quantity_and_level : tuple of str and float
-            Quantity and level whose crossing defines the start of the path.
+            Name and level of a quantity. The path starts at a point at which the quantity crosses
+            this level.
         is_start_of_step : callable
             Function that returns True if a point at the crossing is the start of the requested
             step.
@@ -235,9 +237,9 @@ class CriticalPath(NamedTuple):
     def compute_state_misfit_at_path_start(self, tolerance: float) -> float | None:
         """Compute the misfit of the state at the start of the path.
 
-        The misfit is the value of Psi/a at the point of the path with the initial slip rate of the
-        motion. The misfit is zero for the critical step, because Psi is zero immediately after a
-        step from steady sliding at V_*.
+        The misfit is the value of Psi/a at the point at which the slip rate of the path equals the
+        initial slip rate of the motion. The misfit is zero for the critical step, because Psi is
+        zero immediately after a step from steady sliding at V_*.
 
         Parameters
         ----------
@@ -335,7 +337,7 @@ class CriticalPath(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _end_events_of_path_search(log_slip_rate_at_norm: float) -> tuple[EventSpecification, ...]:
-    """Return the events that end the search for the start of a path without success."""
+    """Return the events at which the search for the start of a path fails."""
     above_norm = log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM
     return (
         rise("log_slip_rate", above_norm, terminal=True, may_defer=True),

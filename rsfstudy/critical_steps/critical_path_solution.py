@@ -35,7 +35,7 @@ class CriticalStepSizeEstimate:
     step_size : float
         Size of the step. See ``StepFamily``.
     relative_error : float
-        Relative error of the size.
+        Relative error of the step size.
     found_from_forward_motions : bool, default: False
         True if the boundary was computed from motions that are integrated forwards in time.
     found_from_limit_cycle : bool, default: False
@@ -53,8 +53,8 @@ def find_boundary_by_critical_path(
 ) -> CriticalStepSizeEstimate | None:
     """Find the critical step size from the critical path.
 
-    The boundary is rejected if smaller steps may be unstable. Smaller steps may be unstable if
-    steady sliding is unstable, or if the next peak of ln V exceeds the instability norm.
+    The boundary is rejected if smaller steps may be unstable, which is the case if steady sliding
+    is unstable, or if the next peak of ln V exceeds the instability norm.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Critical step, the smallest step of the load that triggers instability.
+"""Critical step: the smallest load step that triggers an instability.
 
 The step may be a change in load point velocity, load point displacement or normal stress. A step is
 critical if the peak slip rate after the step just reaches the instability norm.
@@ -96,12 +96,12 @@ def _build_outputs_for_step_quantity(quantity: str) -> tuple[Output, ...]:
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class CriticalStep(Measure):
-    r"""Smallest step after which slip rate reaches the instability norm.
+    r"""Smallest step after which the slip rate reaches the instability norm.
 
-    Depending on ``of``, the critical step is a velocity ratio, a displacement (in units of D_c), or
-    a change in normal stress (in units of sigma_*). The outputs include the sizes of two steps that
-    confirm the critical step. The slider settles after the smaller step, and becomes unstable after
-    the larger step.
+    Depending on the argument ``of``, the critical step is a velocity ratio, a displacement (in
+    units of D_c), or a change in normal stress (in units of sigma_*). The outputs include the sizes
+    of two steps that confirm the critical step. The slider settles after the smaller step, and
+    becomes unstable after the larger step.
 
     Parameters
     ----------
@@ -109,9 +109,9 @@ class CriticalStep(Measure):
         Type of the step: "load_velocity_ratio", "displacement_step" or "normal_stress_step". The
         scene field of this name is ignored. "velocity_step" is an alias of "load_velocity_ratio".
         After a step of displacement or of normal stress, the load point is held (V_0 = 0) unless
-        the scene specifies ``load_velocity_ratio``. Steps of normal stress require a normal stress
-        that is not constant. If a decrease in normal stress triggers the instability, the direction
-        is "down" and the critical step is negative.
+        the scene specifies ``load_velocity_ratio``. Steps of normal stress require a scene whose
+        normal stress is not constant. If a decrease in normal stress triggers the instability, the
+        direction is "down" and the critical step is negative.
     direction : {"up", "down"}, default: "up"
         Direction of the steps: "up" increases the load, and "down" decreases the load.
 
@@ -122,9 +122,9 @@ class CriticalStep(Measure):
 
     Notes
     -----
-    The instability norm is a limit of the dimensionless slip rate :math:`V T/(2 \pi D_c)`, with the
-    period :math:`T` of the scene. Under the slip law at constant normal stress and critical
-    stiffness, and with an infinite instability norm, the critical step [1]_ is
+    The instability norm is a threshold of the dimensionless slip rate :math:`V T/(2 \pi D_c)`,
+    where :math:`T` is the period of the scene. Under the slip law at constant normal stress and
+    critical stiffness, and with an infinite instability norm, the critical step [1]_ is
 
     .. math:: \frac{V_0}{V_*} = 1 + \frac{a}{b - a},
 
@@ -299,10 +299,10 @@ class CriticalStep(Measure):
         The two step sizes differ from the critical step size by the error of the critical step
         size. If the motions after the two steps do not confirm the critical step, the relative
         difference between the two step sizes and the critical step size is increased tenfold, up to
-        2 %. The error of the critical step size is the difference at which the motions confirm the
-        critical step. If a critical step was computed from a critical path, it is rejected if the
-        motions do not confirm it at the first difference. In this case, a smaller step may be
-        critical, because oscillations below the instability norm may grow.
+        2 %. The reported error of the critical step size is the smallest difference at which the
+        motions confirm the critical step. A critical step that was computed from a critical path is
+        rejected if the motions do not confirm it at the initial difference. In this case, a smaller
+        step may be critical, because oscillations below the instability norm may grow.
         """
         first = (
             boundary.relative_error

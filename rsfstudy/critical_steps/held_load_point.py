@@ -5,10 +5,11 @@ while the load point is held. With one state variable, ln V has only one peak, b
 of friction with slip becomes slower and slower after the first peak.
 
 If the law has several state variables, friction may weaken repeatedly. State variables with b < 0
-weaken friction when the slip rate decreases. Pore pressure also weakens friction when the slip rate
-decreases, if dilatancy has lowered the pore pressure before. If the dilatancy is negative, pore
-pressure weakens friction when the slip rate increases again. The motion is therefore integrated
-until no state can weaken friction enough for another peak above the instability norm.
+weaken friction when the slip rate decreases. If dilatancy has lowered the pore pressure, the
+recovery of the pore pressure also weakens friction when the slip rate decreases. If the dilatancy
+is negative, pore pressure weakens friction when the slip rate increases again. The motion is
+therefore integrated until no state can weaken friction enough for another peak above the
+instability norm.
 """
 
 from __future__ import annotations
@@ -129,8 +130,9 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     as ln V decreases, so the state continues to strengthen friction.
 
     The loss of strength due to pore pressure and heat, divided by a, is an upper bound on the
-    increase in ln V due to these two effects. If ln V is increased by this bound, the states must
-    weaken friction more slowly than the spring stress decreases.
+    increase in ln V due to these two effects. The function returns True if, even with ln V
+    increased by this bound, the states weaken friction more slowly than the spring stress
+    decreases.
     """
     _value, slope, shift, shift_slope = scene.friction_relation(point.psis)(point.frictional_stress)
     states, evolve = range(scene.parts.law.state_count), scene.state_evolution_function()
@@ -178,9 +180,9 @@ def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float
 def _bound_unknowns(
     scene: Scene, point: MotionPoint, log_slip_rate: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return states with the highest pressure and the extreme temperatures.
+    """Return the states at the highest pore pressure and extreme temperatures.
 
-    The slip rate of the future motion must not exceed the slip rate that is passed to the function.
+    The bounds are valid as long as the slip rate does not exceed ``log_slip_rate``.
     """
     fluid, temperature = scene.parts.fluid, scene.parts.temperature
     hottest, coldest, range_of_rise = list(point.psis), list(point.psis), 0.0

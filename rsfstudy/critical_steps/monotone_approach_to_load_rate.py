@@ -1,10 +1,10 @@
 """Monotonic rise of slip rate to a fast load point velocity.
 
-If seismic waves radiate most of the stress, the slip rate V rises over a slip of eta V_0/(K D_c),
-which is many times D_c. During the rise of the slip rate, the state stays close to its steady
-state. An explicit integrator would need steps of about D_c during the whole rise of the slip rate.
-The functions of this module test whether the slip rate rises monotonically to the load point
-velocity. If the rise is monotonic, the integration ends early.
+If seismic waves radiate most of the stress, the slip rate V rises gradually. The slip during this
+rise is eta V_0/(K D_c), which is many times D_c. During the rise of the slip rate, the state stays
+close to its steady state. An explicit integrator would need steps of about D_c during the whole
+rise of the slip rate. The functions of this module test whether the slip rate rises monotonically
+to the load point velocity. If the rise is monotonic, the integration ends early.
 
 The test uses two curves in the plane of ln V and state. The two curves meet only at the point of
 steady sliding. The first curve is the steady state as a function of ln V. On the second curve, the
@@ -70,8 +70,8 @@ def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]
     list of EventSpecification
         Events at which ln V rises through levels below ln V_0. The function
         ``rises_monotonically_to_load_rate`` tests the motion at these events. The list of events is
-        empty if the slip rate does not rise slowly. The list is also empty if the scene has several
-        states or inertia, because the test is not valid for such scenes.
+        empty if the slip rate rises quickly. The list is also empty if the scene has several states
+        or inertia, because the test is not valid for such scenes.
     """
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:

@@ -121,15 +121,15 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
     -----
     If the scene has no inertia, the motion is planar and autonomous, so trajectories in the phase
     plane cannot cross. If a peak is not higher than the previous peak, no later peak is higher. If
-    peaks of the slip rate grow, they grow until the motion reaches the instability norm or a limit
-    cycle.
+    successive peaks of the slip rate grow, they continue to grow until the motion reaches the
+    instability norm or a limit cycle.
 
-    If oscillations grow slowly, the computation continues with a somewhat larger orbit, and does
-    not compute the large number of orbits between the two. If all larger orbits grow up to the
-    instability norm, the inner orbit also grows up to the norm. The same rules apply to scenes with
-    inertia, because inertia acts only during ruptures. If the scene has several states, the
-    integration ends only if the slip rate reaches the instability norm, if the motion settles to
-    steady sliding, or if a cycle repeats. The module ``held_load_point`` handles held load points.
+    If oscillations grow slowly, the computation skips a large number of orbits and continues with a
+    somewhat larger orbit. If all larger orbits grow up to the instability norm, the inner orbit
+    also grows up to the norm. The same rules apply to scenes with inertia, because inertia acts
+    only during ruptures. If the scene has several states, the integration ends only if the slip
+    rate reaches the instability norm, if the motion settles to steady sliding, or if a cycle
+    repeats. The module ``held_load_point`` handles held load points.
     """
     if scene.log_load_velocity == -math.inf:
         return compute_peak_excess_over_instability_norm(scene, integrator)
@@ -154,8 +154,8 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
 def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> float:
     """Compute the largest value of ln V on a closed orbit.
 
-    The largest ln V on the orbit is a maximum of ln V next to the start of the motion. The maximum
-    may precede or follow the start. If the motion starts with a decreasing slip rate, the motion is
+    The largest ln V on the orbit is the last maximum before the start of the motion, or the first
+    maximum after the start. If the motion starts with a decreasing slip rate, the motion is
     integrated backwards in time to the previous peak. The rest of the orbit may reach slip rates of
     1e-40 V_*, at which an integration would lose all digits.
     """

@@ -60,10 +60,10 @@ class StepFamily:
     Attributes
     ----------
     min_size : float
-        Smallest size of the search.
+        Smallest step size of the search.
     max_size : float
-        Largest size of the search. If the loading itself reaches the norm, there are no sizes to
-        search, and the largest size does not exceed the smallest size.
+        Largest step size of the search. If the loading itself reaches the norm, there are no step
+        sizes to search, and ``max_size`` is not greater than ``min_size``.
     """
 
     #: Name of the scene field that contains the step.
@@ -124,7 +124,7 @@ class StepFamily:
         step_size : float
             Size of the step.
         relative_error : float
-            Relative error of the size.
+            Relative error of the step size.
 
         Returns
         -------
@@ -134,10 +134,11 @@ class StepFamily:
         raise TypeError(f"{type(self).__name__} does not define this method")
 
     def size_tolerance(self, step_size: float, value_tolerance: float) -> float:
-        r"""Return the tolerance of the size for a tolerance of the step value.
+        r"""Convert a tolerance of the step value to a tolerance of the step size.
 
-        If the size has the returned relative error, the change in the step value has the relative
-        error ``value_tolerance``. The size tolerance is at most ``value_tolerance``.
+        A relative error of the step size that equals the returned tolerance causes a relative error
+        ``value_tolerance`` in the change of the step value. The size tolerance is at most
+        ``value_tolerance``.
 
         Parameters
         ----------
@@ -149,7 +150,7 @@ class StepFamily:
         Returns
         -------
         float
-            Relative tolerance of the size.
+            Relative tolerance of the step size.
 
         Notes
         -----
@@ -180,7 +181,7 @@ class StepFamily:
     def find_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
-        """Yield sizes of the step at which the critical path starts.
+        """Yield estimates of the step size at which the critical path starts.
 
         Parameters
         ----------
@@ -192,7 +193,7 @@ class StepFamily:
         Yields
         ------
         float
-            Size for the next tolerance. The iterator ends early if there is no critical path.
+            Step size for the next tolerance. The iterator ends early if there is no critical path.
         """
         raise TypeError(f"{type(self).__name__} does not define this method")
 
@@ -211,12 +212,12 @@ class StepFamily:
         Returns
         -------
         iterator of float
-            Size for each tolerance. The iterator is empty if no limit cycle touches the norm.
+            Step size for each tolerance. The iterator is empty if no limit cycle touches the norm.
         """
         return iter(())
 
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
-        """Return True if inertia changes the critical size significantly.
+        """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the motion after the step reaches the critical path only after a
         delay.
@@ -224,9 +225,9 @@ class StepFamily:
         Parameters
         ----------
         step_size : float
-            Size at which the critical path starts.
+            Step size at which the critical path starts.
         tolerance : float
-            Requested relative accuracy of the size.
+            Requested relative accuracy of the step size.
 
         Returns
         -------
@@ -328,7 +329,7 @@ class ShootingStepFamily(StepFamily):
     sign_of_triggering_steps: ClassVar[int]
 
     def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
-        """Return the error of the step value, which is the exponential of the size.
+        """Return the error of a step value that is the exponential of the step size.
 
         See ``StepFamily.compute_field_value_error``.
         """
@@ -337,12 +338,12 @@ class ShootingStepFamily(StepFamily):
     def find_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
-        """Yield sizes of the step at which the critical path starts.
+        """Yield estimates of the step size at which the critical path starts.
 
-        At the critical step, the critical path begins with the state before the step. An
-        approximate root of the misfit, and the slope of the misfit at the root, are computed first
-        with a loose tolerance. For each smaller tolerance, one to three paths are integrated. If
-        the scene has several states, there are no critical paths. See
+        If the step is critical, the state at the start of the critical path is the state before the
+        step. An approximate root of the misfit, and the slope of the misfit at the root, are
+        computed first with a loose tolerance. One to three paths are then integrated for each
+        smaller tolerance. If the scene has several states, there are no critical paths. See
         ``StepFamily.find_sizes_by_critical_path``.
         """
         path_at = self.build_critical_path_factory(integrator)
@@ -469,7 +470,7 @@ class ShootingStepFamily(StepFamily):
         return outwards(way) or outwards(-way) if way else outwards(1, -1)
 
     def _search_direction(self, misfit_at_guess: float) -> int:
-        """Return the direction in which the critical size is expected.
+        """Return the direction in which the critical step size is expected.
 
         The result is 1 for larger sizes, -1 for smaller sizes, and 0 if the misfit does not
         indicate a direction.
@@ -499,8 +500,8 @@ def _find_misfit_root(
     """Find the root ln(step size) of a misfit, and the slope of the misfit.
 
     If there is no critical path, only the sign of the misfit is known. The root and the slope are
-    computed from misfits whose magnitude is known. The result is None if the magnitude of too few
-    misfits is known.
+    computed from misfits whose magnitude is known. The result is None if too few misfits have a
+    known magnitude.
     """
     try:
         brentq(misfit_function, *bracket, xtol=1e-4)

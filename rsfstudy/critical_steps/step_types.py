@@ -51,7 +51,7 @@ _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR = 0.1
 
 
 class LoadVelocityStepFamily(ShootingStepFamily):
-    """Steps of load point velocity of size ``|ln(V_0/V_*)|``.
+    """Family of load point velocity steps with the size ``|ln(V_0/V_*)|``.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
         return -1.0 if _reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
 
     def _compute_max_size(self) -> float:
-        """Return the largest size of the search.
+        """Return the largest step size of the search.
 
         After the largest upward step, the load point velocity corresponds to the instability norm.
         After the largest downward step, the load point has the smallest velocity at which sliding
@@ -118,7 +118,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
 
 
 class DisplacementStepFamily(StepFamily):
-    """Steps of load point displacement of size ``|d|`` in units of D_c.
+    """Family of displacement steps with the size ``|d|`` in units of D_c.
 
     The load point is held after the step, unless the scene specifies a load point velocity.
 
@@ -154,7 +154,7 @@ class DisplacementStepFamily(StepFamily):
         return step_size * relative_error
 
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
-        """Return True if inertia changes the critical size significantly.
+        """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the slider follows the critical path with a delay, which changes
         the critical step size in two ways. The load point moves during the delay, and the state
@@ -183,9 +183,10 @@ class DisplacementStepFamily(StepFamily):
     def extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the slip rates immediately after two steps, in units of V_*.
 
-        The first step is the critical step. The second step is the displacement D_c a/(b - a) of
-        the closed form (eq. 13 of doi:10.1007/s11589-014-0098-4). The slip rate is infinite if it
-        exceeds the floating-point range. See ``StepFamily.extra_output_values``.
+        The first step is the critical step. The second step has the displacement D_c a/(b - a),
+        which is the closed form of the critical step (eq. 13 of doi:10.1007/s11589-014-0098-4). The
+        slip rate is infinite if it exceeds the floating-point range. See
+        ``StepFamily.extra_output_values``.
         """
 
         def after(step: float) -> float:
@@ -219,7 +220,7 @@ class DisplacementStepFamily(StepFamily):
             yield abs(start.spring_stress / self.scene.stiffness)
 
     def _compute_max_size(self) -> float:
-        """Return the largest size of the search.
+        """Return the largest step size of the search.
 
         The largest upward step raises the slip rate to the instability norm immediately. If the
         scene has inertia, the range of step sizes is extended, because the slip rate rises with a
@@ -245,7 +246,7 @@ class DisplacementStepFamily(StepFamily):
 
 
 class NormalStressStepFamily(ShootingStepFamily):
-    """Steps of imposed normal stress of size ``|ln(1 + step/sigma_*)|``.
+    """Family of normal stress steps with the size ``|ln(1 + step/sigma_*)|``.
 
     The load point is held after the step, unless the scene specifies a load point velocity. The
     critical path depends on the size, because the step changes the normal stress that acts on
@@ -281,7 +282,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         return math.expm1(self.sign * step_size)
 
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
-        """Return True if inertia changes the critical size significantly.
+        """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the slip rate rises with a delay after the step. The effect of
         inertia on the critical step size depends on the slip rate immediately after the step. See
@@ -304,8 +305,9 @@ class NormalStressStepFamily(ShootingStepFamily):
     def size_error_if_neutrally_stable(self, step_size: float, tolerance: float) -> float:
         """Return the error of the step size close to neutral stability.
 
-        The critical stiffness is proportional to normal stress, and the size is the logarithm of
-        normal stress. See ``StepFamily.size_error_if_neutrally_stable``.
+        The error follows from two facts: the critical stiffness is proportional to normal stress,
+        and the step size is the logarithm of normal stress. See
+        ``StepFamily.size_error_if_neutrally_stable``.
         """
         scene = self.scene_with_step(step_size)
         near = may_have_closed_orbits(scene) and abs(stability_margin(scene)) < 10.0 * tolerance
@@ -324,7 +326,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         return dict(zip(self.extra_output_names, (rate,), strict=True))
 
     def _guess_critical_size(self) -> float:
-        """Return a guess of the critical size.
+        """Return a guess of the critical step size.
 
         For a decrease in normal stress, the guess is the change in Coulomb stress that reaches the
         threshold of the slip law. For an increase in normal stress, the guess is the step after
@@ -355,7 +357,7 @@ class NormalStressStepFamily(ShootingStepFamily):
             return math.nan
 
     def _compute_max_size(self) -> float:
-        """Return the largest size of the search.
+        """Return the largest step size of the search.
 
         The largest step raises the slip rate to the instability norm immediately. With inertia, the
         range of step sizes is extended, because the slip rate rises with a delay while stress
@@ -393,8 +395,8 @@ class NormalStressStepFamily(ShootingStepFamily):
         """Return the largest step size after which the normal stress is positive.
 
         If normal stress depends on shear stress, sigma_3 must remain positive after a decrease in
-        normal stress. If sigma_3 were negative, friction would decrease with slip faster than
-        spring stress, at any slip rate.
+        normal stress. If sigma_3 were negative, friction would decrease faster with slip than the
+        spring stress decreases, at any slip rate.
         """
         follows, _alpha = self.scene.parts.normal_stress.coupling or (0.0, 0.0)
         if self.sign > 0 or not follows:

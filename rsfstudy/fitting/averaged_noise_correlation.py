@@ -17,8 +17,8 @@ class AveragedNoiseCorrelation:
     Parameters
     ----------
     time : ndarray, shape (rows,)
-        Times in s. If the time does not increase from one row to the next, the next row begins
-        another window, and rows of different windows are not correlated.
+        Times in s. A row whose time is not later than the time of the preceding row begins a new
+        window. Rows of different windows are not correlated.
     averaging_time : float
         Averaging time in s.
 
@@ -89,7 +89,7 @@ def apply_running_mean(
     averaging_time : float
         Averaging time in s.
     centre : float, default: 0.0
-        Time in s from a row to the centre of the averaging interval of the row.
+        Time in s from each row to the centre of its averaging interval.
 
     Returns
     -------

@@ -2,10 +2,11 @@
 
 The profile likelihood of a parameter is the likelihood at a fixed value of the parameter, maximised
 with respect to all other parameters [1]_. The squared distance between the fixed value and the best
-value is the increase in the sum of squared whitened residuals, divided by the noise variance. At
-the ends of a confidence interval, the squared distance from the best value is :math:`t^2`, where
-:math:`t` is a quantile of Student's t distribution with the degrees of freedom of the fit. If the
-log-likelihood is nearly quadratic, the interval is computed from the standard error.
+value is defined as the increase in the sum of squared whitened residuals, divided by the noise
+variance. At the ends of a confidence interval, the squared distance from the best value is
+:math:`t^2`, where :math:`t` is a quantile of Student's t distribution with the degrees of freedom
+of the fit. If the log-likelihood is nearly quadratic, the interval is computed from the standard
+error.
 
 References
 ----------
@@ -45,7 +46,7 @@ from rsfstudy.fitting.window_model import coordinate_to_parameter
 
 
 def student_t_multiplier(solution: FitSolution, confidence_level: float) -> float:
-    """Compute the half width of a confidence interval in standard errors.
+    """Compute the half-width of a confidence interval in units of standard error.
 
     Parameters
     ----------
@@ -74,9 +75,9 @@ def confidence_interval(
     Parameters
     ----------
     problem : FitProblem
-        Problem with the model of the record.
+        Least-squares problem that contains the model of the record.
     solution : FitSolution
-        Solution of the problem.
+        Solution of the least-squares problem.
     parameter_name : str
         Name of a free parameter.
 
@@ -112,18 +113,18 @@ class LikelihoodProfile:
     Parameters
     ----------
     problem : FitProblem
-        Problem with the model of the record.
+        Least-squares problem that contains the model of the record.
     solution : FitSolution
-        Solution of the problem.
+        Solution of the least-squares problem.
     parameter_name : str
         Name of a free parameter.
 
     Attributes
     ----------
     best_coordinates : ndarray, shape (parameters,)
-        Coordinates of all free parameters at which the likelihood is highest.
+        Coordinates of all free parameters at the maximum of the likelihood.
     stderr_from_noise : float
-        Contribution of the friction noise to the standard error of the coordinate of the parameter.
+        Standard error of the parameter coordinate, computed from the friction noise only.
     coordinate_change_ratios : ndarray, shape (parameters,)
         Change in the coordinate of each free parameter, per unit change in the coordinate of the
         parameter ``parameter_name``.

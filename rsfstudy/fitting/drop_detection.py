@@ -1,10 +1,10 @@
-"""Detection of drops of shear stress in a noisy record.
+"""Detection of shear stress drops in a noisy record.
 
 The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
 stress in a window after the sample. The windows have lengths of 4, 8, 16, ... sampling intervals.
 The scaled difference is the difference between the two mean stresses, divided by the standard
-deviation of the differences during loading. If a peak of the scaled difference exceeds a threshold,
-the peak is a stress drop (see ``scipy.signal.find_peaks``).
+deviation of the differences during loading. Each peak of the scaled difference that exceeds a
+threshold is reported as a stress drop (see ``scipy.signal.find_peaks``).
 
 The standard deviation of the differences between mean stresses is estimated from the most frequent
 differences [1]_, which occur during loading. The estimate is valid if stress drops occupy at most a
@@ -57,13 +57,13 @@ _MIN_RELATIVE_PROMINENCE = 0.5
 
 
 class DropCandidate(NamedTuple):
-    """Detected drop of stress.
+    """Detected stress drop.
 
     Parameters
     ----------
     start_time, end_time : float
-        Times at which the stress decrease begins and ends. The resolution of the times is the
-        duration of the averaging window.
+        Times at which the stress decrease begins and ends. Both times have a resolution of one
+        averaging window.
     window_duration : float
         Duration of the averaging window, in the unit of ``start_time``.
     mean_difference_stderr : float
@@ -150,9 +150,8 @@ def estimate_mean_and_sd_of_mode(values: np.ndarray) -> tuple[float, float]:
     """Estimate the mean and standard deviation of the most frequent values.
 
     The function finds the shortest interval that contains 40 % of the values. The results are the
-    mean and the standard deviation of a Gaussian distribution. The central 40 % of this Gaussian
-    distribution lies in the shortest interval. Values outside the shortest interval have little
-    effect on the estimates.
+    mean and the standard deviation of the Gaussian distribution whose central 40 % covers exactly
+    this interval. Values outside the shortest interval have little effect on the estimates.
 
     Parameters
     ----------
@@ -177,7 +176,7 @@ def estimate_mean_and_sd_of_mode(values: np.ndarray) -> tuple[float, float]:
 
 
 def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray:
-    """Compute the difference of the window means before and after each sample.
+    """Compute the difference between window means before and after each sample.
 
     Parameters
     ----------
@@ -202,7 +201,7 @@ def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray
 
 
 def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
-    """Detect drops of stress in a record.
+    """Detect stress drops in a record.
 
     Parameters
     ----------
@@ -244,7 +243,7 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
 
 
 def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Resample a record if its sampling intervals vary strongly.
+    """Resample a record evenly if its sampling intervals vary strongly.
 
     The new sampling interval is the median sampling interval, weighted by duration. The function
     averages the samples within each new interval, and interpolates the values of intervals without
@@ -354,7 +353,7 @@ class _WindowMeanDifferences:
         Parameters
         ----------
         longer_windows : list of _WindowMeanDifferences
-            Differences of window means for longer windows. A stress drop is skipped if its
+            Window mean differences for all longer windows. A stress drop is skipped if its
             detection score is clearly higher for a longer window.
 
         Returns

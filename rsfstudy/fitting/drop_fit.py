@@ -6,9 +6,9 @@ start time and end time, the lines are fitted by least squares. The fit with the
 squares determines the start and the end of the drop. The size of the drop is the difference between
 the highest and the lowest stress.
 
-The confidence intervals of the start time and the end time contain all pairs of times for which the
-sum of squares exceeds the smallest sum of squares by less than a fixed multiple of the noise
-variance [1]_.
+The confidence intervals of the start time and the end time are computed from the sums of squares.
+The intervals contain all pairs of times whose sum of squares exceeds the minimum by less than a
+fixed multiple of the noise variance [1]_.
 
 References
 ----------
@@ -61,7 +61,7 @@ _MIN_SAMPLES_BESIDE_DROP = 3
 
 
 class FittedStressDrop(NamedTuple):
-    """Fitted drop of stress.
+    """Fitted stress drop.
 
     Errors are half widths of 95 % confidence intervals.
 
@@ -77,7 +77,7 @@ class FittedStressDrop(NamedTuple):
     stress_before_error, stress_after_error : float
         Errors of ``stress_before`` and ``stress_after``.
     drop_error : float
-        Error of the drop ``stress_before - stress_after``.
+        Error of the stress drop ``stress_before - stress_after``.
     residual_sd : float
         Standard deviation of the residuals.
     starts_before_record, ends_after_record : bool
@@ -123,8 +123,8 @@ class _ThreeLineFits(NamedTuple):
     def best_pair_index(self) -> int:
         """Index of the pair of start and end times with the smallest sum of squares.
 
-        If several sums of squares are equal within rounding errors, the property contains the index
-        of the first pair.
+        If several pairs have the same sum of squares within rounding errors, the result is the
+        index of the first of these pairs.
         """
         return int(
             np.argmax(
@@ -305,10 +305,10 @@ def _fit_three_lines(
 
     The coefficients of a fit are the stresses at the start and the end of the drop, and the slopes
     before and after the drop. A pair of start and end times is rejected if it covers only a
-    fraction of a longer drop. For this reason, a pair of times is rejected if the rate of stress
-    decrease outside the drop exceeds 0.3 times the rate during the drop. A pair of times is also
-    rejected if the stress decrease on one side of the drop exceeds the decrease expected from the
-    slope on the other side by more than half of the drop size.
+    fraction of a longer drop. Such a pair is recognised by a fast stress decrease outside the drop,
+    with a rate of more than 0.3 times the rate during the drop. A pair of times is also rejected if
+    the stress decrease on one side of the drop exceeds the decrease expected from the slope on the
+    other side by more than half of the drop size.
     """
     t0, t1 = corner_time_pairs[:, :1], corner_time_pairs[:, 1:]
     share = np.clip((time - t0) / (t1 - t0), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Times, stresses and slip of the stress drops in a record.
+"""Measurement of the times, stresses and slip of the stress drops in a record.
 
 The function ``read_drops`` finds the stress drops in a record, and computes the properties of each
 drop with their errors.
@@ -31,7 +31,7 @@ _MIN_EXCESS_SLIP_SIGMAS, _MIN_EXCESS_SLIP_FRACTION = 3.0, 0.1
 
 
 class DropSampleIndices(NamedTuple):
-    """Location of a drop among the samples.
+    """Indices of the samples that belong to a stress drop.
 
     Parameters
     ----------
@@ -58,9 +58,8 @@ class DropMeasurements(NamedTuple):
     detection : Detection
         Result of the detection.
     displacement_shows_slip : bool
-        False if a check found that the displacement rate is not higher during the drops than before
-        and after the drops. True if the rate is higher during the drops, or if the rate was not
-        checked.
+        True if the displacement rate is higher during the drops than before and after the drops, or
+        if the rate was not checked. Otherwise, the value is False.
     """
 
     event_rows: list[EventNumbers]
@@ -127,7 +126,7 @@ def displacement_follows_drops(
     times, displacement : ndarray, shape (samples,)
         Times and displacements of the samples.
     drop_sample_indices : sequence of DropSampleIndices
-        Locations of the drops.
+        Indices of the samples in each drop.
 
     Returns
     -------
@@ -162,7 +161,7 @@ def displacement_follows_drops(
 def find_sample_indices_of_drop(
     times: np.ndarray, fitted_candidate: FittedDropCandidate, neighbour_limits: tuple[float, float]
 ) -> DropSampleIndices:
-    """Locate a drop among the samples.
+    """Find the samples that belong to a stress drop.
 
     The averaging window is shortened if it would overlap a neighbouring drop or extend beyond the
     record.
@@ -210,7 +209,7 @@ def measure_drop(
     fitted_candidate : FittedDropCandidate
         Fitted drop.
     sample_indices : DropSampleIndices
-        Location of the drop.
+        Indices of the samples in the drop.
     neighbour_limits : (float, float)
         End of the previous drop, and start of the next drop.
 

@@ -47,7 +47,7 @@ def detect_unspecified_filter(
     """Test whether friction was filtered before it was recorded.
 
     Running means are tested for all records. Low-pass filters are tested only if the noise is
-    correlated, because a low-pass filter correlates white noise.
+    correlated, because a low-pass filter would have introduced a correlation into white noise.
 
     Parameters
     ----------

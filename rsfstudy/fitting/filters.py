@@ -85,7 +85,7 @@ class Filter:
         Parameters
         ----------
         text : str
-            Kind and size of the filter, separated by a space.
+            Kind of filter, followed by a space and the averaging time or corner frequency.
 
         Returns
         -------
@@ -235,11 +235,11 @@ class Filter:
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def _averaging_times(self) -> tuple[float, float]:
-        """Return the parts of the averaging time in s before and after a row."""
+        """Return the durations in s of the averaging interval before and after a row."""
         return (0.5 * self.size, 0.5 * self.size) if self.kind == MEAN else (self.size, 0.0)
 
     def _running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:
-        """Return the time offsets of the points in a running mean.
+        """Return the time offsets of the points that a running mean averages.
 
         Each offset is given in s, relative to the time of the row. If the averaging time is at
         least four sampling intervals, the points are one sampling interval apart.

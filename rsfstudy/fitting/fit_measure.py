@@ -85,7 +85,7 @@ class Fit(Measure):
     Parameters
     ----------
     records : tuple of Record
-        Records to choose from. The options ``record`` and ``together`` select the fitted records.
+        Available records. The options ``record`` and ``together`` select the fitted records.
     free : tuple of str, default: ("a", "b", "slip_distance", "mu_star", "trend1")
         Names of the free parameters (see ``rsfstudy.fitting.PARAMETERS``). The other parameters are
         fixed at their values in the scene.
@@ -116,17 +116,17 @@ class Fit(Measure):
         process with an automatic order, or "ar1", "ar2" and so on.
     loading : {"steps", "recorded"}, default: "steps"
         Loading of the model. With "steps", the load point velocity is constant between the steps.
-        With "recorded", the model follows the recorded displacement. It also follows the recorded
-        normal stress, unless the normal stress of the scene is constant.
+        With "recorded", the model follows the recorded displacement. The model also follows the
+        recorded normal stress, unless the scene has a constant normal stress.
     filter : str, optional
         Filter that was applied to friction before it was recorded, such as "mean 1.0" (see
         ``rsfstudy.fitting.Filter``). By default, friction was not filtered.
     posterior : int, default: 0
         Number of draws from the posterior distribution.
     machine_stiffness : float, default: 0.0
-        Stiffness of the machine in Pa/um. The stiffness of each window is the machine stiffness
-        divided by the normal stress before the step. If 0, all windows have the stiffness of the
-        scene.
+        Stiffness of the machine in Pa/um. In each window, the stiffness of the model is the machine
+        stiffness divided by the normal stress before the step. If 0, all windows have the stiffness
+        of the scene.
     stiffness_relative_stderr : float, default: 0.0
         Relative standard error of the stiffness. The standard errors of the parameters include this
         error, unless the stiffness is a free parameter.
@@ -289,7 +289,7 @@ class Fit(Measure):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Meanings and units of the outputs, of their dimensions, and of the options."""
+        """Meanings and units of the outputs, the output dimensions and the options."""
         draws = [Quantity("draw", "", "1", "number of the draw")] if self.posterior else []
         return (*super().quantities, *draws)
 
@@ -472,7 +472,7 @@ class Fit(Measure):
         problem : FitProblem
             Least-squares problem for the model of all windows.
         solution : FitSolution
-            Solution of the problem.
+            Solution of the least-squares problem.
 
         Raises
         ------
@@ -511,7 +511,7 @@ class Fit(Measure):
         problem : FitProblem
             Least-squares problem for the model of all windows.
         solution : FitSolution
-            Solution of the problem.
+            Solution of the least-squares problem.
 
         Returns
         -------

@@ -567,7 +567,7 @@ def _has_converged(
     whitened_jacobian: np.ndarray,
     tolerance: float = _NOISE_PASS_TOLERANCE,
 ) -> bool:
-    """Return True if the last parameter change is small compared with the errors.
+    """Return True if the last parameter changes are much smaller than their errors.
 
     Parameters
     ----------

@@ -34,8 +34,8 @@ class FitSolution:
     noise_caused_covariance : ndarray, shape (parameters, parameters)
         Contribution of the friction noise to the covariance matrix.
     stiffness_caused_covariance : ndarray, shape (parameters, parameters)
-        Contribution of the standard error of a fixed stiffness. The rest of the covariance matrix
-        is due to noise in the load point displacement.
+        Contribution of the standard error of a fixed stiffness to the covariance matrix. The
+        remaining contribution is due to noise in the load point displacement.
     numerical_errors : dict of {str: float}
         Numerical errors of the free parameters.
     noise_model : NoiseModel

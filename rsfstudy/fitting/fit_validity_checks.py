@@ -1,8 +1,8 @@
 """Tests of whether the standard errors of a fit are valid.
 
 If the standard errors are not valid, the status of the fit is ``errors_not_valid``, but the
-parameter values can still be used. If a check fails, it returns a string that describes the
-violated condition and a remedy. The string has no final full stop.
+parameter values can still be used. Each check that fails returns a string that describes the
+violated condition and suggests a remedy. The string has no final full stop.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def describe_asymmetric_intervals(
     """Describe the parameters with very asymmetric confidence intervals.
 
     A record may provide only a lower or an upper limit for a parameter, for example for the
-    stiffness of a very stiff machine. In this case, the standard errors of all correlated
-    parameters are too small.
+    stiffness of a very stiff machine. In this case, the standard errors of all parameters that are
+    correlated with this parameter are too small.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def _check_residuals_are_white(solution: FitSolution) -> Iterator[str]:
 def describe_load_point_noise(
     solution: FitSolution, loading: str, displacement_noise_sd: float
 ) -> str:
-    """Return a remark about the noise of load point displacement.
+    """Return a remark about the noise in the load point displacement.
 
     Parameters
     ----------
@@ -259,8 +259,8 @@ def find_unidentified_parameters(
 ) -> tuple[str, ...]:
     """Return the parameters that the record does not constrain.
 
-    A record does not constrain a slip distance if the record has fewer than 1.5 rows per slip
-    distance of displacement.
+    A slip distance is not constrained if fewer than 1.5 rows are recorded while the load point
+    moves by this slip distance.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def describe_unidentified_parameters(
     Returns
     -------
     str
-        Message that names the parameters, with possible reasons.
+        Message that lists the parameters and the possible reasons.
     """
     text = f"the record does not constrain {', '.join(parameter_names)}"
     if sparse := set(parameter_names) - set(solution.unidentified_parameters):
@@ -338,7 +338,7 @@ def describe_whiteness(p_value: float, noise_order: int, rows: int) -> str:
     Returns
     -------
     str
-        One line for the terminal.
+        Description on a single line, for display in a terminal.
 
     Examples
     --------

@@ -79,8 +79,8 @@ class FitWindow:
 
     Notes
     -----
-    If friction before the step is not a linear function of time, the window begins where friction
-    becomes linear. The window of a hold includes the sliding after the hold.
+    If friction before the step is not a linear function of time, the window begins at the time from
+    which friction is linear. The window of a hold includes the sliding after the hold.
 
     Examples
     --------
@@ -137,7 +137,7 @@ class FitWindow:
 
     @property
     def window_properties(self) -> dict[str, float]:
-        """Velocities, ends of the window in um, normal stress and load point noise."""
+        """Velocities, window limits in um, normal stress and load point noise."""
         record, rows = self.record, self.record_row_indices
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {
@@ -243,7 +243,7 @@ class FitWindow:
         return found
 
     def _earliest_start_time(self, step: LoadingStep) -> float:
-        """Return the earliest possible start of a window in s.
+        """Return the earliest time in s at which a window can start.
 
         If friction before the step is not linear, the window begins later than the earliest
         possible start.
@@ -435,7 +435,7 @@ def guess_parameters(
         Names of the free parameters. The fixed parameters have the values of the scene.
     slip_distance_guesses : (float, float)
         Slip distances of the first and the second state variable in um. The first slip distance is
-        the unit of slip in the scene.
+        also the unit of slip in the scene.
 
     Returns
     -------

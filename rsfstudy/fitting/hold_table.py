@@ -95,7 +95,7 @@ def build_hold_table(
 def fit_healing_rate(
     durations: np.ndarray, healing: np.ndarray, covariance: np.ndarray
 ) -> tuple[float, float, float]:
-    """Fit healing against the decimal logarithm of the hold duration.
+    """Fit a line to healing against the decimal logarithm of the hold duration.
 
     Parameters
     ----------
@@ -110,8 +110,9 @@ def fit_healing_rate(
         Slope of the ordinary least-squares line, or NaN if there are fewer than two different
         durations.
     stderr : float
-        Standard error of the slope. The error follows from the covariance matrix, or from the
-        scatter of healing about the line if the scatter is larger.
+        Standard error of the slope. The error is computed from the covariance matrix. If the
+        scatter of healing about the line is larger than expected from the covariance matrix, the
+        error is computed from the scatter.
     intercept : float
         Healing at a hold duration of 1 s, computed from the line.
     """

@@ -6,10 +6,10 @@ and :math:`\mu_p` the peak friction after reloading. As in the measure ``Healing
 :math:`\mu_h - \mu_0`, and healing is :math:`\mu_p - \mu_0`.
 
 The three friction values are estimated jointly by generalised least squares with correlated noise.
-:math:`\mu_0` is the mean friction of the linear portion before the hold. :math:`\mu_h` is obtained
-from a polynomial in the logarithm of the hold time, which is evaluated at the end of the hold.
-:math:`\mu_p` is the maximum of a polynomial in time. The common linear trend of friction with load
-point displacement is subtracted.
+:math:`\mu_0` is the mean friction of the linear portion before the hold. To estimate :math:`\mu_h`,
+a polynomial in the logarithm of the hold time is fitted to friction and evaluated at the end of the
+hold. :math:`\mu_p` is the maximum of a polynomial in time. The common linear trend of friction with
+load point displacement is subtracted.
 """
 
 from __future__ import annotations
@@ -213,7 +213,7 @@ class HoldFit:
         self.rows_after = np.flatnonzero((time > hold.reload.middle) & (time < hold.window_end))
 
     def measure(self) -> tuple[list[float], list[float], list[float]]:
-        """Estimate the frictions of the hold.
+        """Estimate friction before, during and after the hold, and derived quantities.
 
         Returns
         -------
@@ -260,7 +260,7 @@ class HoldFit:
 
     @cached_property
     def _reference(self) -> LinearFit:
-        """Fit of rows without a peak, whose noise is used to select windows."""
+        """Fit to rows without a friction peak, whose noise is used to select windows."""
         rows, after = self.hold.rows_before, self.rows_after
         if len(after) > 1:
             gaps = np.gradient(self.time)
@@ -274,7 +274,7 @@ class HoldFit:
         return fit_linear_model(self.time[rows], self.level[rows], np.vander(u, 3), quick=True)
 
     def _hold_coordinate(self, rows: np.ndarray) -> np.ndarray:
-        """Return the logarithm of the hold time, mapped to 1 at the end of the hold."""
+        """Return the logarithm of hold time, scaled to 1 at the end of the hold."""
         times = np.append(self.time[rows], self.hold.reload.middle)
         logs = np.log(times - self.hold.stop.middle)
         return normalise(logs)[:-1]
@@ -282,8 +282,8 @@ class HoldFit:
     def _choose_rows_of_hold_end(self) -> np.ndarray:
         """Return the rows of the window at the end of the hold.
 
-        Rows are left out if their distance from an end of the hold is less than the error of the
-        step time.
+        Rows close to the start or the end of the hold are excluded, because the step times have
+        errors.
         """
         time, begins, ends = self.time, self.hold.stop.end, self.hold.reload.start
         rows = np.flatnonzero((time > begins) & (time < ends))
@@ -370,7 +370,7 @@ class HoldFit:
 
 
 def _iterate_peak_windows(rows: np.ndarray, centre: int) -> Iterator[np.ndarray]:
-    """Iterate over windows of rows around a centre, from short to long."""
+    """Iterate over windows around a centre row, from the shortest to the longest."""
     for half in _PEAK_HALF_WIDTHS:
         if centre < half or centre + half >= len(rows):
             return

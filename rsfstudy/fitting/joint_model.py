@@ -137,8 +137,8 @@ def select_values_of_window(values: Mapping[str, ValueType], number: int) -> dic
     Returns
     -------
     dict
-        Values of the shared parameters and of the parameters of the window. The names do not
-        include window numbers.
+        Values of the shared parameters, and of the parameters that are specific to the window. The
+        names do not include window numbers.
 
     Examples
     --------
@@ -225,7 +225,7 @@ class JointModel:
         Returns
         -------
         float
-            Largest delay of the loading in s, for the window to which the step time belongs.
+            Largest delay of the loading in s, in the window whose step time has this name.
         """
         return self.models[max(split_window_number(parameter_name)[1] - 1, 0)].max_loading_delay
 

@@ -34,9 +34,9 @@ def find_start_of_linear_friction(
 ) -> float:
     """Find the time at which the linear part of friction before a step begins.
 
-    The earlier rows before a step are discarded if two conditions are met. First, two separate
-    lines must fit friction far better than a single line. The comparison of the two fits accounts
-    for the correlation of the residuals. Second, friction in the earlier rows must differ
+    Rows at the beginning of the tested interval are discarded if two conditions are met. First, two
+    separate lines must fit friction far better than a single line. The comparison of the two fits
+    accounts for the correlation of the residuals. Second, friction in the earlier rows must differ
     noticeably from the line through the later rows. The test of both conditions is repeated with
     the remaining rows until no rows are discarded. Before the test, outliers are replaced by
     interpolated values.

@@ -18,15 +18,16 @@ def displacement_is_slip(
 ) -> bool:
     """Return True if a displacement is the slip of the fault.
 
-    The velocity of a load point is constant before a velocity step, and again constant after the
-    step. If the displacement is the slip of the fault, the displacement itself does not have
-    constant velocities. In this case, the velocities are constant only if the elastic shortening of
-    the machine is added to the displacement.
+    At a velocity step, the load point changes from one constant velocity to another constant
+    velocity. The slip rate of the fault, in contrast, is not constant before or after the step. If
+    the displacement is the slip of the fault, only the sum of the displacement and the elastic
+    shortening of the machine therefore has constant velocities.
 
     Parameters
     ----------
     time, displacement : ndarray, shape (rows,)
-        Times and displacements from the previous step to the next step around a velocity step.
+        Times and displacements of the rows around a velocity step, from the previous step to the
+        next step.
     shortening : ndarray, shape (rows,)
         Elastic shortening of the machine: shear stress divided by stiffness, in the units of the
         displacement.

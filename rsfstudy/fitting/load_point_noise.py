@@ -36,7 +36,7 @@ def shift_steps_by_their_errors(
 ) -> list[list[LoadingStep]]:
     """Return copies of the steps with shifted times and velocities.
 
-    The covariance matrix of the step times and velocities is the sum of contributions of
+    The covariance matrix of the step times and velocities can be written as a sum over
     statistically independent errors. In each copy of the steps, the step times and velocities are
     shifted by 1 % of one independent error.
 

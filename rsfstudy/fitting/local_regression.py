@@ -1,12 +1,12 @@
 r"""Generalised least squares, and local polynomials with data-driven windows.
 
-The maximum of noisy samples overestimates a peak, and the last sample before a change is a noisy
-estimate of the limit before the change. The functions of this module therefore fit a polynomial to
-the samples in a window. A window that is too long biases the polynomial, and a window that is too
-short increases its variance. The function ``choose_polynomial_window`` selects the longest window
-in which a polynomial describes the samples within their noise. The estimate then uses a polynomial
-of higher degree in the same window, so that the bias of the estimate is small compared with its
-standard error [1]_.
+The maximum of noisy samples overestimates the height of a peak. The last sample before a sudden
+change is only a noisy estimate of the value before the change. The functions of this module
+therefore fit a polynomial to the samples in a window. A window that is too long biases the
+polynomial, and a window that is too short increases its variance. The function
+``choose_polynomial_window`` selects the longest window in which a polynomial describes the samples
+within their noise. The estimate then uses a polynomial of higher degree in the same window, so that
+the bias of the estimate is small compared with its standard error [1]_.
 
 References
 ----------
@@ -71,7 +71,7 @@ def fit_linear_model(
     """Fit a linear model by generalised least squares.
 
     The noise is an autoregressive process, whose coefficients are estimated by restricted maximum
-    likelihood (see ``rsfstudy.fitting.noise``). Outliers are left out.
+    likelihood (see ``rsfstudy.fitting.noise``). Outliers are excluded from the fit.
 
     Parameters
     ----------
@@ -163,7 +163,8 @@ def choose_polynomial_window(
     Returns
     -------
     rows : ndarray
-        Row indices of the selected window, or of the shortest window.
+        Row indices of the selected window. If the polynomial is not adequate in any window, the
+        shortest window is selected.
     is_adequate : bool
         True if the polynomial describes the samples in the selected window.
     """
@@ -230,7 +231,7 @@ def find_polynomial_maximum(coefficients: np.ndarray) -> float:
 
 
 def _residual_squares(columns: np.ndarray, degree: int) -> float:
-    """Fit the last column, and return the sum of squared residuals."""
+    """Fit the last column by other columns, and return the residual sum of squares."""
     basis = np.linalg.qr(columns[:, : degree + 1])[0]
     left = columns[:, -1] - basis @ (basis.T @ columns[:, -1])
     return float(left @ left)

@@ -102,8 +102,7 @@ def check_noise_name(noise_name: str) -> None:
 class NoiseModel:
     """Noise model with an autoregressive process for each sampling interval.
 
-    The noise level may change along the record. The noise level is the standard deviation of the
-    noise.
+    The noise level is the standard deviation of the noise, and may change along the record.
 
     Parameters
     ----------
@@ -216,7 +215,7 @@ class NoiseModel:
         r"""Effective sample size for estimating a mean.
 
         The effective sample size is the number of rows :math:`n` divided by the ratio of the
-        spectral power at zero frequency to the variance. The ratio of power and variance is
+        spectral power at zero frequency to the variance. This ratio is
 
         .. math:: \frac{(1 - k_1^2)(1 - k_2^2) \cdots}{(1 - c_1 - \dots - c_m)^2},
 
@@ -293,7 +292,7 @@ def fit_noise(
     min_noise_sd: float = 0.0,
     averaging_time: float = 0.0,
 ) -> NoiseModel:
-    """Estimate the noise from the residuals of a fit by REML.
+    """Estimate the noise by REML from the residuals of a fit.
 
     Parameters
     ----------
@@ -376,7 +375,7 @@ def guess_noise_by_moments(
     min_noise_sd: float = 0.0,
     averaging_time: float = 0.0,
 ) -> tuple[NoiseModel, float]:
-    """Estimate the noise from the residuals of a fit by the method of moments.
+    """Estimate the noise by the method of moments from the residuals of a fit.
 
     Parameters
     ----------

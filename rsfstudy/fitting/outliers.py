@@ -56,10 +56,10 @@ def find_non_outlier_mask(
     """Find the rows that are not outliers.
 
     The function compares each residual with the median of the neighbouring residuals. A row is an
-    outlier if its residual differs from this median by more than six local standard deviations. The
-    difference must also exceed twice the difference between the model friction of the row and the
-    median of the neighbouring model friction. The second condition is necessary because a misfit at
-    a peak of the model is not an outlier.
+    outlier if its residual differs from this median by more than six local standard deviations. In
+    addition, the difference must be more than twice the corresponding difference between the model
+    friction of the row and the median model friction of the neighbouring rows. The second condition
+    is necessary because a misfit at a peak of the model is not an outlier.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def find_non_outlier_mask(
 
 
 def _median_of_neighbours(values: np.ndarray) -> np.ndarray:
-    """Compute the median of the neighbours of each row, without the row itself."""
+    """Compute the median of the neighbours of each row, excluding the row itself."""
     around = np.ones(2 * _NEIGHBOURS_PER_SIDE_FOR_MEDIAN + 1, dtype=bool)
     around[_NEIGHBOURS_PER_SIDE_FOR_MEDIAN] = False
     lower, upper = (

@@ -79,9 +79,9 @@ def sample_posterior_coordinates(
     Parameters
     ----------
     problem : FitProblem
-        Problem with the model of the record.
+        Least-squares problem that contains the model of the record.
     solution : FitSolution
-        Solution of the problem, with a finite covariance matrix.
+        Solution of the least-squares problem, with a finite covariance matrix.
     draw_count : int
         Number of draws.
     seed : int, default: 0
@@ -160,9 +160,9 @@ def sample_posterior_parameters(
     Parameters
     ----------
     problem : FitProblem
-        Problem with the model of the record.
+        Least-squares problem that contains the model of the record.
     solution : FitSolution
-        Solution of the problem.
+        Solution of the least-squares problem.
     draw_count : int
         Number of draws.
 

@@ -66,8 +66,8 @@ class Record:
     processing : tuple of str, optional
         Descriptions of the selections and filters that were applied to the rows.
     filter : str, default: ""
-        Filter that was applied to friction, in the form of ``Filter.parse``. A fit applies the same
-        filter to the model.
+        Filter that was applied to friction, as a string that ``Filter.parse`` accepts. A fit
+        applies the same filter to the model.
 
     Raises
     ------
@@ -259,13 +259,14 @@ class Record:
         xarray.Dataset
             Table with the dimension ``hold``. The variables are ``begins`` and ``duration`` in s,
             ``velocity_before`` and ``velocity_after`` in um/s, ``friction_before``,
-            ``peak_friction``, ``healing``, ``relaxation``, and ``peak_displacement`` in um. For
-            ``friction_before`` and the quantities after it, ``<name>_stderr`` is the standard
-            error. The scalar ``healing_rate`` is the increase in healing per decade of hold
-            duration, and ``healing_rate_stderr`` is the standard error of the healing rate.
-            ``trend`` is the trend of friction in 1/um. The trend is subtracted from friction. If
-            friction has no peak after a hold, or if the record has too few rows, the values are
-            NaN. The healing rate is NaN if the record contains fewer than two hold durations.
+            ``peak_friction``, ``healing``, ``relaxation``, and ``peak_displacement`` in um. The
+            standard errors of ``friction_before`` and of all variables after it in this list have
+            names of the form ``<name>_stderr``. The scalar ``healing_rate`` is the increase in
+            healing per decade of hold duration, and ``healing_rate_stderr`` is the standard error
+            of the healing rate. ``trend`` is the trend of friction in 1/um. The trend is subtracted
+            from friction. If friction has no peak after a hold, or if the record has too few rows,
+            the values are NaN. The healing rate is NaN if the record contains fewer than two hold
+            durations.
 
         See Also
         --------
@@ -300,7 +301,7 @@ class Record:
         return table.assign_attrs(self._build_dataset_attributes("Holds"))
 
     def stiffness(self) -> xr.Dataset:
-        """Measure the stiffness of the machine in the locked portions of the record.
+        """Measure the machine stiffness from the locked portions of the record.
 
         A locked portion is a part of the record in which the fault is almost locked, because the
         load point has just started, stopped or reversed. The stiffness is the slope of friction
@@ -313,8 +314,8 @@ class Record:
             dimension ``portion``, the dataset contains ``kind`` ("reloading", "unloading" or
             "initial loading"), ``begins`` and ``ends`` in s, ``portion_stiffness`` and
             ``portion_stiffness_stderr``. If the normal stress was recorded, the dataset also
-            contains ``machine_stiffness`` in Pa/um and the corresponding variables. If the record
-            has no locked portion, the stiffness is NaN.
+            contains ``machine_stiffness`` in Pa/um, with its standard error and its value in each
+            portion. If the record has no locked portion, the stiffness is NaN.
 
         See Also
         --------
@@ -322,10 +323,10 @@ class Record:
 
         Notes
         -----
-        The stiffness is the weighted mean of all portions. If the portions differ by more than
-        their standard errors, the standard error of the mean is enlarged accordingly. The initial
-        loading is used only if there are no other portions, because the slope may increase while
-        the sample settles.
+        The stiffness is the weighted mean of the stiffnesses of all portions. If these stiffnesses
+        differ by more than their standard errors, the standard error of the mean is enlarged
+        accordingly. The initial loading is used only if there are no other portions, because the
+        slope may increase while the sample settles.
         """
         table = measure_stiffness(
             self.time,

@@ -36,9 +36,9 @@ def loading_history(
         Times in s.
     use_recorded_rows : bool
         If True, each row of the record begins a segment. The recorded displacement is first
-        replaced by the closest sequence of displacements that never decreases. If False, the load
-        point velocity and the normal stress are constant between the steps, and change at a
-        constant rate during a step.
+        replaced by the closest nondecreasing sequence of displacements. If False, the load point
+        velocity and the normal stress are constant between the steps, and change at a constant rate
+        during a step.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def stepwise_loading(start_time: float, steps: Sequence[LoadingStep]) -> np.ndar
     Returns
     -------
     ndarray, shape (segments, 4)
-        Segments in the format of ``loading_history``.
+        Segments in the same format as the result of ``loading_history``.
     """
     pieces, level = [(start_time, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
@@ -157,7 +157,7 @@ def _build_loading_from_rows(
     Returns
     -------
     ndarray, shape (rows, 4)
-        Segments in the format of ``loading_history``.
+        Segments in the same format as the result of ``loading_history``.
     """
     lasts = np.diff(record.time)
     moved = isotonic_regression(record.columns["displacement"]).x

@@ -2,7 +2,8 @@ r"""Stiffness of the machine from the portions of a record in which the fault is
 
 If the load point starts, stops or reverses, the fault is almost locked until friction has changed
 considerably. The slope of friction against load point displacement is then the stiffness :math:`k`
-divided by the normal stress. The fault slips a little at the slip rate :math:`V`:
+divided by the normal stress. However, the fault slips slowly at the slip rate :math:`V`, which
+reduces the slope of friction:
 
 .. math:: d\mu/dx = k (1 - v), \qquad v = V/V_l,
 
@@ -19,10 +20,10 @@ where :math:`\mu_1` and :math:`v_1` are the values at :math:`x = 0`. The curve i
 generalised least squares with correlated noise. The parameters :math:`a` and :math:`g` have broad
 prior distributions, so the standard error of :math:`k` includes the uncertainty of the slip.
 
-Friction may have a trend during sliding. If the trend depends on load point displacement, it
-contributes to the slope of a locked portion. If the trend depends on slip, it does not contribute.
-Half of the trend is subtracted from the stiffness, and the other half is included in the standard
-error.
+Friction may have a trend during sliding. A trend with load point displacement contributes to the
+slope of a locked portion, whereas a trend with slip does not. The fit does not distinguish between
+the two cases. Half of the trend is therefore subtracted from the stiffness, and the other half is
+included in the standard error.
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ class Portion(NamedTuple):
     Parameters
     ----------
     kind : str
-        Kind of the portion.
+        Kind of portion: "reloading", "unloading" or "initial loading".
     time, displacement, friction : ndarray, shape (rows,)
         Times in s, load point displacements in um since the beginning of the portion, and friction.
     """
@@ -150,7 +151,7 @@ def _build_table(
     *,
     has_stress: bool,
 ) -> xr.Dataset:
-    """Build the table of portions with the mean stiffness.
+    """Build a table of the locked portions and the mean stiffness.
 
     Each row contains the kind, begin, end, stiffness, standard error and normal stress of a
     portion. ``error_by_trend`` is the error of all stiffnesses due to the trend of friction.
@@ -302,12 +303,12 @@ def fit_stiffness(portion: Portion) -> tuple[float, float]:
     Parameters
     ----------
     portion : Portion
-        Rows of the portion.
+        Portion of the record to which the stiffness is fitted.
 
     Returns
     -------
     stiffness : float
-        Stiffness over normal stress in 1/um.
+        Stiffness divided by normal stress, in 1/um.
     stderr : float
         Standard error of the stiffness.
     """

@@ -1,4 +1,4 @@
-"""Detection and fitting of drops of shear stress in a record.
+"""Detection and fitting of shear stress drops in a record.
 
 The module ``drop_detection`` detects the drops, and the module ``drop_fit`` fits straight lines to
 each drop. The function ``find_drops`` calls both modules.
@@ -54,7 +54,7 @@ class FittedDropCandidate(NamedTuple):
 
 
 def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCandidate], Detection]:
-    """Find and fit the drops of stress in a record.
+    """Find and fit the stress drops in a record.
 
     If two fitted drops overlap, the two detected drops are merged and fitted again as a single
     drop.
@@ -91,7 +91,7 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCan
 
 
 def _compute_drop_size(drop: FittedStressDrop) -> float:
-    """Return the decrease in stress in a drop."""
+    """Return the decrease in stress during a drop."""
     return drop.stress_before - drop.stress_after
 
 

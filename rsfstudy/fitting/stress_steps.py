@@ -180,8 +180,7 @@ def merge_stress_into_velocity_steps(
     Returns
     -------
     tuple of LoadingStep
-        Steps in order of time. The fields for the normal stresses before and after the steps are
-        not set.
+        Steps in order of time. The normal stresses of the steps are not yet set.
     """
     found = []
     for step in velocity_steps:

@@ -166,7 +166,7 @@ def find_noise_level_changes(
     """Find the rows at which the standard deviation of the noise changes.
 
     The function segments the logarithms of the absolute differences between successive residuals. A
-    misfit of the model near a step is either smooth or short, so that the misfit affects only a few
+    model misfit near a step is either smooth or short, and therefore affects only a few of the
     differences. In contrast, a change in the noise level affects all differences after the change.
 
     Parameters

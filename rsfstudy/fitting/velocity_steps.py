@@ -120,9 +120,10 @@ class LoadingStep(NamedTuple):
 def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[LoadingStep, ...]:
     """Detect the load point velocity steps in a record.
 
-    Two neighbouring segments are separate if their velocities differ by at least 20 %. In addition,
-    the fit of two lines must reduce the sum of squares of a single line by far more than expected
-    by chance. A ramp between two velocities is detected as a single step with a finite duration.
+    Two neighbouring segments are treated as separate segments if two conditions are met. First,
+    their velocities must differ by at least 20 %. Second, fitting two lines instead of a single
+    line must reduce the sum of squares by far more than expected by chance. A ramp between two
+    velocities is detected as a single step with a finite duration.
 
     Parameters
     ----------
@@ -221,8 +222,8 @@ class CumulativeLineFitSums:
         Returns
         -------
         tuple of ndarray
-            The mean of t, the mean of x, and three sums over the rows. If dt and dx are the
-            deviations from the two means, the terms of the sums are dt dt, dt dx and dx dx.
+            The mean of t, the mean of x, and the weighted sums of dt dt, dt dx and dx dx over the
+            rows. Here, dt and dx are the deviations of t and x from their means.
         """
         n, st, sx, stt, stx, sxx = (
             self.cumulative_sums[stop_row] - self.cumulative_sums[start_row]
@@ -287,8 +288,8 @@ class CumulativeLineFitSums:
 def _deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Compute the deviation of each sample from the line through its neighbours.
 
-    The deviations are multiplied by a constant factor. If the samples are white noise, the standard
-    deviation of the scaled deviations is therefore equal to the standard deviation of the noise.
+    The deviations are multiplied by a constant factor, which is chosen so that deviations of white
+    noise have the same standard deviation as the noise.
     """
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     off = displacement[1:-1] - (1.0 - share) * displacement[:-2] - share * displacement[2:]
@@ -466,8 +467,8 @@ def _refine_line_intersection_time(
 ) -> float:
     """Compute the intersection of two lines again, from all rows of the record.
 
-    The intersection is less accurate before this computation if the segmentation used averages over
-    blocks of rows.
+    The first estimate of the intersection is less accurate if the rows were averaged in blocks for
+    the segmentation.
     """
     middle = int(np.searchsorted(time, initial_time))
     i, j = max(middle - 20 * row_reach, 0), min(middle + 20 * row_reach, len(time))

@@ -305,8 +305,9 @@ class WindowModel:
         Returns
         -------
         ndarray, shape (rows,)
-            Friction of the model. All values are NaN if the simulation fails, or if it needs far
-            more evaluations than the simulation of a motion that fits a record.
+            Friction of the model. All values are NaN if the simulation fails. All values are also
+            NaN if the simulation needs far more evaluations than usual, because such a motion is
+            unlikely to fit a record.
 
         Raises
         ------

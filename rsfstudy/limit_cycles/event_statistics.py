@@ -90,7 +90,7 @@ class EventStatistics(Measure):
     cycles : int, default: 200
         Number of recurrence intervals.
     discarded_cycles : int, default: 10
-        Number of recurrence intervals at the beginning that are discarded.
+        Number of initial recurrence intervals that are discarded.
     checked_cycles : int, default: 20
         Number of recurrence intervals for which the numerical errors are computed.
     slip_rate_ratio : float, default: 10.0
@@ -121,9 +121,10 @@ class EventStatistics(Measure):
         \frac{s}{\sqrt{n}}, \quad s \sqrt{\frac{\kappa - 1}{4 n}}, \quad
           c \sqrt{\frac{\kappa - 1}{4 n} + \frac{c^2}{n}}.
 
-    The first two errors refer to the first ``checked_cycles`` intervals, which usually overestimate
-    the errors of all intervals. If the motion is chaotic, motions with two tolerances separate, and
-    the errors are about as large as the standard error for the checked intervals.
+    The first two errors are computed from the first ``checked_cycles`` intervals only, and usually
+    overestimate the errors for all intervals. If the motion is chaotic, motions that are computed
+    with different tolerances diverge. In this case, the first two errors are about as large as the
+    standard error for the checked intervals.
 
     Examples
     --------
@@ -274,7 +275,7 @@ def _iterate_smooth_events(scene: Scene, integrator: Integrator) -> Iterator[_Ev
 
 
 def _samples(events: list[_Event]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the recurrence intervals, and the stress drop at the end of each."""
+    """Return the recurrence intervals, and the stress drop that ends each interval."""
     intervals = [after.time - before.time for before, after in pairwise(events)]
     return np.array(intervals), np.array([event.stress_drop for event in events[1:]])
 

@@ -133,10 +133,10 @@ class LimitCycle(RecordingMeasure):
     the event with the highest slip rate. If the motion never repeats, the status is
     ``not_periodic``, and the message reports the range of the events.
 
-    ``slip_mode`` is ``stick_slip`` if the peak slip rate of the cycle reaches a limit, and
-    ``slow_slip`` if the peak slip rate is lower. If a motion settles with decaying oscillations,
-    ``slip_mode`` is ``damped_oscillation``. If a motion settles without oscillations, ``slip_mode``
-    is ``steady``.
+    The output ``slip_mode`` is ``stick_slip`` if the peak slip rate of the cycle reaches a limit
+    that depends on the scene (see Notes), and ``slow_slip`` if the peak slip rate is lower. If a
+    motion settles with decaying oscillations, ``slip_mode`` is ``damped_oscillation``. If a motion
+    settles without oscillations, ``slip_mode`` is ``steady``.
 
     The status is ``no_limit_cycle`` only if small perturbations of steady sliding decay. If a
     motion approaches steady sliding and the largest growth rate of small perturbations is zero
@@ -164,8 +164,8 @@ class LimitCycle(RecordingMeasure):
     With radiation damping, the limit of the peak slip rate is :math:`a \sigma_*/\eta`. At the slip
     rate :math:`a \sigma_*/\eta`, a small change in slip rate changes the radiated stress and the
     direct effect of friction by the same amount. Without radiation damping, the limit is the
-    instability norm. A motion settles with oscillations if the slowest-decaying eigenvalues of
-    steady sliding are a complex pair.
+    instability norm. A motion settles with oscillations if the slowest-decaying perturbations of
+    steady sliding have complex eigenvalues.
 
     The error estimates are based on two computations of the cycle with different tolerances. The
     error estimates also include the correction of each result for the closure error, which is the
@@ -407,7 +407,7 @@ def status_from_output_errors(
     output_errors: np.ndarray,
     outputs: slice = slice(None),
 ) -> tuple[Status, str]:
-    """Return the status that follows from the errors of the main results.
+    """Determine the status from the errors of the main results.
 
     Parameters
     ----------
@@ -425,7 +425,7 @@ def status_from_output_errors(
     status : Status
         Status ``unverified`` if an error is too large, and otherwise ``ok``.
     message : str
-        Largest relative error, or an empty string.
+        Message with the largest relative error, or an empty string.
     """
     worst = float((output_errors / _primary_output_error_scales(orbit))[outputs].max())
     if worst <= integrator.result_tolerance(Accuracy.MAX_ERROR_OVER_RTOL):

@@ -93,8 +93,8 @@ class LimitCycleSearch:
     Attributes
     ----------
     cycles : list of Cycle
-        Cycles that were computed. If ``follow_until_converged`` has returned True, the last cycle
-        is the limit cycle.
+        All computed cycles. If ``follow_until_converged`` has returned True, the last cycle is the
+        limit cycle.
     """
 
     def __init__(self, scene: Scene, integrator: Integrator) -> None:
@@ -237,7 +237,7 @@ class LimitCycleSearch:
         self._image_correction = self._predict_return_map_image_change(self._correction)
 
     def _predict_return_map_image_change(self, section_change: Sequence[float]) -> list[float]:
-        """Compute the change of the image P(s) for a change of the section s."""
+        """Predict the change in the image P(s) due to a change in the section s."""
         by_stress, by_state = section_change
         return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
 
@@ -283,10 +283,11 @@ class LimitCycleSearch:
     def _should_leap_to_fixed_point(self) -> bool:
         """Return True if the search should leap to the extrapolated fixed point.
 
-        A leap to the extrapolated fixed point is useless if the next cycle would come equally close
-        to the fixed point. A long leap towards the fixed point is avoided, because the motion may
-        settle to steady sliding after a long leap. If a leap does not halve the change in spring
-        stress per cycle, no further leap follows, because repeated leaps may form a loop.
+        The search does not leap to the extrapolated fixed point if the next cycle would come
+        equally close to the fixed point without a leap. The search also avoids long leaps, because
+        the motion may settle to steady sliding after a long leap. If a leap does not halve the
+        change in spring stress per cycle, no further leap follows, because repeated leaps may form
+        a loop.
         """
         cycle = self.cycles[-1]
         left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
@@ -313,7 +314,7 @@ class StickSlipSequence:
     Parameters
     ----------
     cycles : list of Cycle
-        Cycles of the motion. The results of ``LimitCycle`` refer to a cycle as an event.
+        Cycles of the motion. In the results of ``LimitCycle``, a cycle is called an event.
     orbit : PeriodicOrbit or None
         Periodic orbit that the motion approaches, or None if no orbit was found.
     may_still_converge : bool
@@ -421,8 +422,8 @@ def find_recurrence_period(
     cycles : sequence of Cycle
         Successive cycles.
     compared_state_indices : sequence of int, optional
-        Indices of the states to compare. By default, all states are compared except the states that
-        a part lists in its attribute ``excluded_from_distance``.
+        Indices of the states to compare. By default, all states are compared, except the states in
+        the attribute ``excluded_from_distance`` of a scene part.
 
     Returns
     -------

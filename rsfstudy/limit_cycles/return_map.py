@@ -10,14 +10,14 @@ map of spring stress and states from one section (rise of V through V_0) to the 
 cycles is a fixed point of the n-th power of the return map.
 
 The eigenvalues of the derivative of the return map are the Floquet multipliers, the factors by
-which small perturbations grow during one orbit. The orbit repels if the absolute value of a
-multiplier exceeds 1. When a multiplier passes through -1, an orbit with twice the number of cycles
-branches off (period doubling).
+which small perturbations grow during one orbit. An orbit repels nearby motions if the absolute
+value of a multiplier exceeds 1. When a multiplier passes through -1, an orbit with twice the number
+of cycles branches off (period doubling).
 
-If the effect of inertia is small, a perturbation along the motion only shifts the time. The number
-of independent perturbations is therefore one less than the number of unknowns of a section. A
-perturbation along the motion changes the states at constant spring stress, because spring stress
-has a maximum at a section.
+If the effect of inertia is small, a perturbation in the direction of the motion only shifts the
+motion in time. The number of independent perturbations is therefore one less than the number of
+unknowns of a section. A perturbation along the motion changes the states at constant spring stress,
+because spring stress has a maximum at a section.
 
 Notes
 -----
@@ -224,7 +224,7 @@ class ReturnMap:
         stored.
     counted : sequence of int, optional
         Indices of the states used for the distance between two sections. By default, all states are
-        used except the states that a part lists in its attribute ``excluded_from_distance``.
+        used, except the states in the attribute ``excluded_from_distance`` of a scene part.
     """
 
     def __init__(
@@ -373,9 +373,9 @@ class ReturnMap:
     ) -> tuple[Numbers, Numbers]:
         """Compute the direction of the motion at a section, and its effect on the image.
 
-        The effect on the image is its change due to a displacement of the section along the motion.
-        If the effect of inertia is small, a displacement along the motion changes only the duration
-        of the cycle.
+        The effect on the image is the change in the image that results from a displacement of the
+        section along the motion. If the effect of inertia is small, a displacement along the motion
+        changes only the duration of the cycle.
 
         Parameters
         ----------
@@ -403,7 +403,7 @@ class ReturnMap:
     def _differentiate_cycle(
         self, start_section: np.ndarray, difference_step: float
     ) -> np.ndarray | None:
-        """Compute the derivatives of one cycle by differences of order four.
+        """Compute the derivatives of one cycle by fourth-order finite differences.
 
         The derivative along the motion is computed from the time derivatives of the unknowns,
         without finite differences. The result is None if a motion does not complete the cycle.
@@ -477,7 +477,7 @@ class ReturnMap:
         )
 
     def refine_orbit(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-        """Compute a known periodic orbit again with the accuracy of this return map.
+        """Recompute a known periodic orbit with the accuracy of this return map.
 
         Parameters
         ----------
@@ -565,10 +565,11 @@ class ReturnMap:
     def _largest_scaled_section_change(
         self, section_change: np.ndarray, section: np.ndarray, state_scale: float
     ) -> float:
-        """Return the largest component of a change of a section.
+        """Return the largest scaled component of a change in a section.
 
-        The unknowns of a fluid may have large values. If the value of a fluid unknown exceeds the
-        scale of the states, its change is divided by the ratio of the value to the scale.
+        The unknowns of a fluid may have large values. If a fluid unknown exceeds the scale of the
+        states, the change in the unknown is therefore divided by the ratio of the unknown to the
+        scale.
         """
         changes, first = np.abs(section_change), 1 + self.scene.parts.law.state_count
         changes[first:] /= np.maximum(1.0, np.abs(section[first:]) / state_scale)

@@ -251,9 +251,9 @@ def _cycle_event_specifications(log_load_velocity: float) -> tuple[EventSpecific
 def _are_log_rate_ranges_approaching_zero(log_slip_rate_ranges: list[float]) -> bool:
     """Return True if the decreasing ranges of ln V approach zero.
 
-    The ranges of ln V in the last three cycles, with differences d_1 and d_2, are extrapolated as a
-    geometric series. The extrapolated further decrease of the range is d_2**2/(d_1 - d_2). Near the
-    onset of stick-slip, the ranges of ln V decrease slowly towards a positive limit instead.
+    The ranges of ln V in the last three cycles decrease by d_1 and then by d_2. These decreases are
+    extrapolated as a geometric series, which gives a further decrease of d_2**2/(d_1 - d_2). Near
+    the onset of stick-slip, the ranges of ln V decrease slowly towards a positive limit instead.
     """
     if len(log_slip_rate_ranges) <= _MIN_SHRINKING_CYCLES or not all(
         y < x for x, y in pairwise(log_slip_rate_ranges[-_MIN_SHRINKING_CYCLES:])

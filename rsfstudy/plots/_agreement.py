@@ -1,4 +1,4 @@
-"""Figure of the agreement between another code and known answers."""
+"""Figure that compares the results of another code with known answers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def draw_agreement(digits: Mapping[str, CurvePoints], label: str, required_digit
     label : str
         Label of the x axis. The first letter is capitalised.
     required_digits : float
-        Number of digits that is required to pass. The figure shows this number as a dashed line.
+        Number of correct digits that is required to pass the comparison. A dashed line in the
+        figure marks this number.
 
     Returns
     -------

@@ -387,7 +387,7 @@ def set_log_scale(axes: Axes, axis_name: str) -> None:
     axes : matplotlib.axes.Axes
         Axes to change.
     axis_name : {"x", "y"}
-        Axis that gets the log scale.
+        Axis that is changed to a log scale.
     """
     axes.set(**{f"{axis_name}scale": "log"})
     axis: Axis = getattr(axes, f"{axis_name}axis")

@@ -35,7 +35,7 @@ _MAX_POINTS_OF_REPEATED_AXES, _MAX_PANELS_AFTER_REPEATING = 4, 12
 def choose_figure(
     dataset: xr.Dataset, user_figure: Any = None, variable: str | None = None
 ) -> tuple[Declared, xr.Dataset]:
-    """Choose the figure of a dataset and create all its panels.
+    """Choose the figure that displays a dataset, and create all its panels.
 
     Parameters
     ----------

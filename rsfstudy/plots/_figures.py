@@ -97,8 +97,8 @@ def draw_figure(
 
     Notes
     -----
-    Only figures of rsfstudy can be selected by name. The function never imports a module that a
-    results file names.
+    Only figures of rsfstudy can be selected by name. The function never imports a module whose name
+    is stored in a results file.
 
     If the results have more axes than the declared figure can display, the function draws a generic
     figure of maps or lines instead.

@@ -53,7 +53,7 @@ def plot_healing(
         Styles that override the style of rsfstudy, as for ``rsfstudy.plot``.
     width : quantity, optional
         Width of the figure, from "60 mm" to "600 mm". If the figure is narrower than 110 mm, the
-        panels are one below the other.
+        panels are stacked vertically.
 
     Returns
     -------

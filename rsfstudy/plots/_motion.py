@@ -67,7 +67,7 @@ def plot_motion(
         required variables are ``slip``, ``log10_slip_rate``, ``frictional_stress``, the variable
         along x, and ``normal_stress_ratio`` or ``effective_normal_stress``. In addition, a motion
         needs ``friction_coefficient``, and a limit cycle needs ``shear_stress``. All variables must
-        have the dimensions of ``slip``. The attribute ``scene`` is also required.
+        have the same dimensions as the variable ``slip``. The attribute ``scene`` is also required.
     rig : Rig, optional
         Rig whose scales convert the axes to MPa, um and s. By default, the axes are in the units of
         the dataset.

@@ -113,7 +113,7 @@ def _select_data_of_panel(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
 def restrict_panel_to_point_of_extra_dims(
     panel: Panel, point_indices: Mapping[str, int], title_suffix: str
 ) -> Panel:
-    """Restrict a panel to one point of additional dimensions.
+    """Restrict a panel to a single point along each additional dimension.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def iterate_curves_and_styles(
 
 
 def _choose_style_of_second_hue_point(point_number: int) -> dict[str, str]:
-    """Return the line and marker fill style of a point of the second ``hue`` axis."""
+    """Return line and marker fill styles for a point of the second ``hue`` axis."""
     line, fill = _LINE_AND_FILL_STYLES_OF_SECOND_HUE[
         point_number % len(_LINE_AND_FILL_STYLES_OF_SECOND_HUE)
     ]
@@ -427,7 +427,7 @@ def _resolve_text_or_function(
 ) -> str:
     """Return a label or title of a panel, or a default if the text is None.
 
-    If the label or title is a function, the function is called with the dataset.
+    If the label or title is a function, it is called with the dataset as its argument.
     """
     if text_or_function is None:
         return default_text

@@ -109,7 +109,7 @@ def fit_panel_columns(panel_columns: int) -> int:
     Parameters
     ----------
     panel_columns : int
-        Number of columns of panels without a requested width.
+        Number of panel columns if no width is requested.
 
     Returns
     -------

@@ -55,7 +55,7 @@ def style_context(user_styles: Any = None, width: Any = None) -> Iterator[None]:
         is applied.
     width : quantity, optional
         Width of the figures that rsfstudy creates inside the ``with`` block, for example "85 mm".
-        By default, the figure determines its width.
+        By default, each figure has its own default width.
 
     Yields
     ------
@@ -496,9 +496,9 @@ def freeze_tick_label_size(axes: Axes) -> None:
 def finalize_layout(figure: Figure) -> None:
     """Compute the final layout of a figure.
 
-    The function executes the layout engine twice. The first execution creates the ticks, and the
-    ticks move the panels. Next, the function wraps long titles. The second execution adjusts the
-    layout to the wrapped titles.
+    The function runs the layout engine twice. The first run creates the ticks, which change the
+    positions of the panels. Next, the function wraps long titles. The second run adjusts the layout
+    to the wrapped titles.
 
     Parameters
     ----------

@@ -124,8 +124,8 @@ def wrap_text(text: str, max_line_characters: int) -> str:
     text : str
         String, which may contain mathtext.
     max_line_characters : int
-        Maximum number of visible characters per line. Longer words and formulas are placed on
-        separate lines.
+        Maximum number of visible characters per line. Words and formulas that are longer than a
+        line are placed on separate lines.
 
     Returns
     -------
@@ -293,7 +293,7 @@ def format_slope(row: xr.Dataset, name: str, max_decimals: int | None = None) ->
     r"""Format a slope and its error.
 
     The error is the sum of the standard error and the numerical error. The standard error measures
-    the misfit of the fitted line.
+    the scatter of the data about the fitted line.
 
     Parameters
     ----------

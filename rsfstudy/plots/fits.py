@@ -134,7 +134,7 @@ def _select_thinned_columns_of_fit(
 ) -> list[np.ndarray]:
     """Return the columns of a fit without rows that have missing values.
 
-    If the columns are long, rows are omitted at regular intervals.
+    If the columns have many rows, some rows are omitted at regular intervals.
     """
     columns = np.array([fit[name].values for name in column_names])
     columns = columns[:, np.isfinite(columns).all(axis=0)]
@@ -204,9 +204,10 @@ def _fit_y_limits_to_visible_lines(axes: Axes) -> None:
 
 
 def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the residuals of the fits and their moving averages.
+    """Draw the residuals of the fits, and the moving averages of the residuals.
 
-    Where the window of a step overlaps the window of an earlier step, the average is pale.
+    If the window of a step overlaps the window of an earlier step, the moving average in the
+    overlap is drawn in a pale colour.
     """
     previous_end, end, overlap = dict[int, float](), dict[int, float](), False
     axes.axhline(0.0, color="0.5", lw=0.8, zorder=2)

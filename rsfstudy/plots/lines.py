@@ -208,8 +208,8 @@ def _describe_places_of_identical_curves(
     """Describe the points of a group of identical curves.
 
     The description contains the coordinates that are equal for all curves. If all coordinates
-    differ, the description lists all points. For a large group, the description contains only the
-    first point and the number of remaining points.
+    differ, the description lists all points. If the group is large, the description contains only
+    the first point and the number of remaining points.
     """
     places = [
         list(dict.fromkeys(describe_point(group, d) for group in identical_curves))

@@ -286,7 +286,7 @@ def _find_horizontal_cell_runs(cell_mask: np.ndarray) -> list[tuple[int, int, in
 def _outline_of_cell_run(
     cell_edges: tuple[np.ndarray, np.ndarray], row: int, first_column: int, stop_column: int
 ) -> list[tuple[Any, Any]]:
-    """Return the corners of the rectangle that a run of cells covers."""
+    """Return the corners of the rectangle covered by consecutive cells."""
     (left, right), (low, high) = (
         cell_edges[0][[first_column, stop_column]],
         cell_edges[1][row : row + 2],

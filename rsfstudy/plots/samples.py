@@ -143,7 +143,7 @@ def posterior_figure(dataset: xr.Dataset) -> tuple[CornerFigure, xr.Dataset]:
     figure : CornerFigure
         Corner plot of the first parameters. Fits of several laws or steps have different colours.
     dataset : xarray.Dataset
-        Dataset in which the draws of each parameter are a variable.
+        Dataset with one variable per parameter, which contains the draws of the parameter.
     """
     names = [str(n) for n in dataset["parameter"].values][:_MAX_SCATTERED_PARAMETERS]
     draws = {n: dataset["posterior"].sel(parameter=n, drop=True) for n in names}
@@ -227,7 +227,7 @@ def _limit_ticks(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -> Non
 def draw_histogram(
     variable_name: str, colour_dimension: Sequence[str], dataset: xr.Dataset, axes: Axes
 ) -> None:
-    """Draw histograms of a variable, one for each point of other axes.
+    """Draw one histogram of a variable for each point of the other axes.
 
     Parameters
     ----------

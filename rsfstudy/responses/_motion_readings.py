@@ -81,7 +81,7 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
 
 
 def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
-    """Return a quantity that has the same events as the friction coefficient.
+    """Return a quantity whose events coincide with events of friction.
 
     If normal stress is constant and the law is not regularised, events of the friction coefficient
     coincide with events of the spring stress.

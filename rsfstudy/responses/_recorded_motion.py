@@ -1,4 +1,4 @@
-"""Recorded motions, and errors of results that depend on a single instant."""
+"""Recorded motions, and error estimates for results read at a single instant."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class RecordedMotion(NamedTuple):
     recorded_rows : ndarray, shape (n, columns)
         Recorded samples. The columns are documented in ``rsfstudy.motion.recording``.
     neglected_inertia_error : ndarray, shape (n,)
-        Error of ln V that neglected inertia has caused up to each row. See
+        Error of ln V due to neglected inertia, accumulated up to each row. See
         ``rsfstudy.motion.neglected_inertia_error``.
     """
 
@@ -111,7 +111,7 @@ def record_motion_of_segment(
     end_time : float, default: inf
         End time in units of D_c/V_*.
     allow_early_stop : bool, default: False
-        If True, ignore a ``MotionStopped`` after the extremum.
+        If True, a ``MotionStopped`` exception after the extremum is ignored.
 
     Returns
     -------

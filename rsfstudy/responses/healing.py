@@ -73,7 +73,7 @@ _OUTPUTS = (
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Healing(RecordingMeasure):
-    r"""Relaxation and healing of friction by the first hold of a loading.
+    r"""Relaxation and healing of friction due to the first hold in a loading.
 
     The definitions are the same as in laboratory studies. Relaxation is the change of friction
     during the hold, and is usually negative. Healing is the peak friction after reloading minus the
@@ -82,8 +82,8 @@ class Healing(RecordingMeasure):
 
     If the hold does not begin in steady sliding, the message of the outcome reports the distance
     from steady sliding. If the peak friction exceeds the friction at the end of the record by less
-    than the error of the peak, the status is ``not_applicable``. The record begins with the hold
-    and has the shape (phases,). Times are in units of D_c/V_*.
+    than the error of the peak, the status is ``not_applicable``. The record of the motion begins
+    with the hold. The recorded quantities have the shape (phases,). Times are in units of D_c/V_*.
 
     Parameters
     ----------

@@ -80,17 +80,18 @@ class LinearStability(Measure):
 
     Notes
     -----
-    Let :math:`s` be slip divided by :math:`D_c`. A perturbation of slip that grows as :math:`\exp(p
-    s)` changes frictional stress by the perturbation times :math:`G(p)`. With the stiffness
-    :math:`K = k D_c/\sigma_*` and :math:`w = V T/(2 \pi D_c)`, the growth rate :math:`p` satisfies
+    Let :math:`s` be slip divided by :math:`D_c`. If a perturbation of slip is proportional to
+    :math:`\exp(p s)`, the change in frictional stress is the perturbation multiplied by
+    :math:`G(p)`. With the stiffness :math:`K = k D_c/\sigma_*` and :math:`w = V T/(2 \pi D_c)`, the
+    growth rate :math:`p` satisfies
 
     .. math:: K (1 + w^2 p^2) + \eta V p + G(p) = 0.
 
-    The growth rate and the angular frequency are the real part and the imaginary part of
-    :math:`p V/V_*`, for the root :math:`p` with the largest real part. If this root is real, the
-    angular frequency is zero. The stiffness is critical if :math:`p` is imaginary [1]_. Under the
-    slip law and the slowness law, the critical stiffness of quasi-static, drained motion at
-    :math:`V_*` is
+    The measure selects the root :math:`p` with the largest real part. The growth rate is the real
+    part of :math:`p V/V_*`, and the angular frequency is its imaginary part. If this root is real,
+    the angular frequency is zero. The stiffness is critical if :math:`p` is purely imaginary [1]_.
+    Under the slip law and the slowness law, the critical stiffness of quasi-static, drained motion
+    at :math:`V_*` is
 
     .. math:: K = \frac{b - a}{1 - (\mu_* - \alpha) \cot\varphi},
 
@@ -138,9 +139,9 @@ class LinearStability(Measure):
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Stiffness of the scene. The measure ignores this value unless it is needed.
+        """Stiffness field of the scene, whose value is ignored unless it is needed.
 
-        The stiffness is needed for the growth rate.
+        The value is needed only to compute the growth rate.
         """
         return () if self.growth_rate else ("stiffness_ratio",)
 
@@ -148,7 +149,8 @@ class LinearStability(Measure):
         """Return the definition of the measure as plain data.
 
         The description contains ``growth_rate`` only if it is True. Declarations without growth
-        rates are therefore the same as the declarations of versions without this option.
+        rates are therefore identical to the declarations that earlier versions wrote, before this
+        option existed.
 
         Returns
         -------

@@ -54,7 +54,7 @@ GROWTH_OUTPUTS = (
 
 
 def _needs_full_equations(scene: Scene, steady_state: SteadySliding) -> bool:
-    """Return True if the slow manifold is not accurate enough at this slip rate."""
+    """Return True if the slow manifold is too inaccurate at the given slip rate."""
     norm = scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
     return bool(norm > _MIN_SLIP_RATE_NORM_FOR_FULL_EQUATIONS)
 

@@ -288,9 +288,10 @@ def _misfit_to_closed_form(
 def _compute_step_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]:
     """Compute the asymmetries between a step and the inverse step.
 
-    An asymmetry is the ratio of the magnitudes of the stress changes after the two steps, minus 1.
-    The dictionary contains the asymmetries of the direct effect and of the evolution to steady
-    sliding. If sliding cannot be steady after one of the two steps, the dictionary is empty.
+    The asymmetry is defined as the ratio of the stress change after one step to the stress change
+    after the inverse step (in magnitude), minus 1. The dictionary contains the asymmetries of the
+    direct effect and of the evolution to steady sliding. If sliding cannot be steady after one of
+    the two steps, the dictionary is empty.
     """
     steady, inverse_steady = (scene.steady_sliding(x) for x in (log_slip_rate, -log_slip_rate))
     if steady is None or inverse_steady is None:

@@ -72,7 +72,7 @@ class StepResponse(RecordingMeasure):
     Parameters
     ----------
     peaks : int, default: 8
-        Largest number of peaks of slip rate.
+        Maximum number of slip rate peaks.
     phases : int, default: 2000
         Number of points of the path along ``phase``, distributed over slow parts and ruptures of
         the motion.

@@ -118,8 +118,8 @@ class VelocityStep(RecordingMeasure):
 
     The definitions are the same as in laboratory studies. The parameter ``a`` follows from the
     extremum of friction after the step, and ``a - b`` follows from friction at the end of the
-    record. The slip distance is the displacement from the extremum of friction to the point at
-    which the difference from the final friction has decreased to 1/e of the difference at the
+    record. The slip distance is measured from the extremum of friction to the point at which the
+    difference between friction and its final value has decreased to 1/e of the difference at the
     extremum. The slip distance is reported as load point displacement and as slip, which excludes
     the elongation of the spring. The results are not corrected for the stiffness of the machine,
     and therefore show the effect of a soft machine.
@@ -131,7 +131,8 @@ class VelocityStep(RecordingMeasure):
 
     If friction has no extremum after the step, or if ``b`` is smaller than its error, the status is
     ``not_applicable``, and the outcome contains only the available results. Distances are in units
-    of D_c. The record begins at the step and has the shape (phases,).
+    of D_c. The record of the motion begins at the step. The recorded quantities have the shape
+    (phases,).
 
     Parameters
     ----------

@@ -42,9 +42,9 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
         Name of a rig quantity or of a scene field.
     values : sequence of quantity, str, or mapping
         Values of the axis. A string is a range with units, ``first:last:count`` or
-        ``first:last:count:log``. Each label of a mapping has either a rig or the values of several
-        fields. The values of a mapping are converted to SI units. A mapping may also be a table, as
-        in `Axis.cases`.
+        ``first:last:count:log``. A mapping assigns either a rig or the values of several fields to
+        each label. The values of a mapping are converted to SI units. A mapping may also be a
+        table, as in `Axis.cases`.
     units : str, or mapping of str to str, optional
         Units of plain numbers, or of the columns of a table. By default, plain numbers are in SI
         units.
@@ -149,7 +149,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     Parameters
     ----------
     quantity_name : str
-        Name of the quantity, in the form that axes with units use.
+        Name of the quantity, as it is used on axes with units.
     values : sequence of quantity
         Values to convert. Plain numbers are already in the requested units.
     units : str
@@ -258,7 +258,7 @@ def factor_to_si(quantity_name: str, units: str) -> Fraction:
     Parameters
     ----------
     quantity_name : str
-        Name of the quantity, in the form that axes with units use.
+        Name of the quantity, as it is used on axes with units.
     units : str
         Units to convert from. A stiffness may be in units of friction divided by displacement,
         which are converted to 1/m.

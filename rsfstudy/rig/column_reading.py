@@ -1,4 +1,4 @@
-"""Options, columns and rows that are common to all functions for reading records.
+"""Reading options and columns shared by all functions that read records.
 
 The functions `read_record`, `events` and `history` use different columns of a file. `read_columns`
 reads the columns that one of these functions can use, from a source in any format.
@@ -27,7 +27,7 @@ _STRESS_COLUMNS = ("shear_stress", "normal_stress")
 
 @dataclass(frozen=True)
 class ReadingOptions(RowSelection):
-    """Reading options that all record-reading functions share.
+    """Options shared by all functions that read records.
 
     The class `RowSelection` describes the options that are not listed here.
 
@@ -104,7 +104,7 @@ def read_columns(
     usable: UsableColumns,
     options: ReadingOptions,
 ) -> ColumnsOfSource:
-    """Read the columns of a source that a function can use.
+    """Read those columns of a source that the calling function can use.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def read_columns(
     selected_columns : mapping of str to str or tuple, or None
         Heading and units of columns by name.
     usable : UsableColumns
-        Columns that the function can use.
+        Columns that the calling function can use.
     options : ReadingOptions
         Reading options.
 

@@ -70,8 +70,8 @@ def read_si_scales(
 ) -> dict[str, UnitScale]:
     r"""Determine the SI values of the dimensionless units of a dataset.
 
-    The function reads the scales from the coordinates of the dataset. Pass arguments for scales
-    that the dataset does not contain.
+    The function reads the scales from the coordinates of the dataset. If the dataset does not
+    contain a scale, pass the scale as an argument.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def has_units_unexpected_by_its_figures(dataset: xr.Dataset) -> bool:
-    """Return True if results do not have the units of the figures of studies.
+    """Return True if results do not have the units that study figures require.
 
     Parameters
     ----------

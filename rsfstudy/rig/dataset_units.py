@@ -41,7 +41,7 @@ class DatasetUnits:
         stress, length, time : str
             Requested units.
         **si_scales : float
-            Scales that the dataset does not contain, in the form of the arguments of
+            Scales that the dataset does not contain, passed as keyword arguments of
             `read_si_scales`.
 
         Returns
@@ -111,5 +111,5 @@ class DatasetUnits:
 
     @property
     def are_unexpected_by_figures(self) -> bool:
-        """True if the units of the results differ from the units in figures of studies."""
+        """True if the results do not have the units that study figures require."""
         return dataset_scales.has_units_unexpected_by_its_figures(self._dataset)

@@ -1,4 +1,4 @@
-"""Laboratory records from files and arrays.
+"""Reading of laboratory records from files and arrays.
 
 `read_record` is the main function.
 """
@@ -58,7 +58,7 @@ def read_record(
     source : str, Path, mapping, pandas.DataFrame, xarray.Dataset or Record
         Path of a file, or an object in memory. The format of a file is recognised by its first
         bytes: text (UTF-8, UTF-16 or Windows-1252), Excel, MATLAB, TDMS, NetCDF or xlook. Text
-        files may be compressed by gzip, bzip2 or xz. The names of arrays are ``time``,
+        files may be compressed by gzip, bzip2 or xz. The arrays must be named ``time``,
         ``displacement`` (of the load point), ``friction`` or ``shear_stress``, and optionally
         ``normal_stress``. By default, arrays are in s, um and MPa, and times may have the type
         `numpy.datetime64` or `numpy.timedelta64`. If the names contain units, for example ``LP disp

@@ -104,8 +104,8 @@ class Rig(HtmlTableMixin):
         Activation energies :math:`Q_a` and :math:`Q_b` of the direct effect and of the evolution
         effect in J/mol.
     pressurisation_factor : quantity, optional
-        Undrained increase :math:`\Lambda_p` of pore pressure per temperature in Pa/K. If the rig
-        has a pressurisation factor, its scenes have ``fluid="thermal"``.
+        Undrained increase :math:`\Lambda_p` in pore pressure per unit increase in temperature, in
+        Pa/K. If the rig has a pressurisation factor, its scenes have ``fluid="thermal"``.
 
     Raises
     ------
@@ -230,7 +230,7 @@ class Rig(HtmlTableMixin):
         )
 
     def __repr__(self) -> str:
-        """Return the quantities of the rig with units, without omitted quantities."""
+        """Return a string that lists the specified quantities of the rig with units."""
         shown = in_display_units(self.as_dict())
         parts = [f"{name}='{value:.12g} {units}'" for name, (value, units) in shown.items()]
         return f"Rig({', '.join(parts)})"
@@ -373,8 +373,8 @@ class Rig(HtmlTableMixin):
         Raises
         ------
         InvalidValue
-            If the units are incompatible, if the dataset belongs to another rig, or if the dataset
-            has another reference rate than the rig.
+            If the units are incompatible, if the dataset belongs to another rig, or if the
+            reference rates of the dataset and the rig differ.
         DataError
             If the dataset is already in physical units, or if the dataset was not created by
             rsfstudy.

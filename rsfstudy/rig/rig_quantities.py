@@ -1,4 +1,4 @@
-"""Quantities of a rig, and scene fields with dimensionless units.
+"""Rig quantities, and scene fields that have dimensionless units.
 
 The function ``convert_rig_value_to_si`` converts quantities of a rig. This function calls
 ``units.convert_to_si``, and also converts stiffness in units of friction divided by displacement.
@@ -301,7 +301,7 @@ def derive_scene_fields_from_rig(
     rig_values : mapping of str to float or ndarray
         Quantities of the rig in SI units.
     with_heat : bool, default: True
-        Whether to include the fields of shear heating and thermal pressurisation.
+        If True, the result includes the fields of shear heating and thermal pressurisation.
 
     Returns
     -------
@@ -351,7 +351,7 @@ def _derive_heat_fields(rig: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def is_dimensionless_field_with_scale(field_name: str) -> bool:
-    """Return True if a scene field has a dimensionless unit.
+    """Return True if a scene field is expressed in a dimensionless unit.
 
     Parameters
     ----------

@@ -85,13 +85,13 @@ class LatticeScenesOnRig:
                     )
 
     def _derive_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
-        """Compute scene fields from the rig, with heat only if the base has heat."""
+        """Compute scene fields from the rig, without heating if the base is isothermal."""
         hot = self.base_scene.parts.temperature.name != "isothermal"
         return derive_scene_fields_from_rig(rig_values, with_heat=hot)
 
     @property
     def units(self) -> dict[str, str]:
-        """Units of the quantities that axes vary, keyed by axis name."""
+        """Units of the quantities that vary along axes, keyed by axis name."""
         return {name: units for along in self.axes for name, units in along.units.items()}
 
     def compute_rig_quantities(self, axis_row: AxisRow) -> dict[str, Any]:
@@ -253,8 +253,7 @@ def convert_scene_and_axes_to_rig(
     axes : list of Axis
         Axes with physical units.
     sizes : dict of str to float
-        Conversion factor of each field. The axis values of the field were multiplied by this
-        factor.
+        Factor by which the axis values of each field were multiplied in the conversion.
     """
     sizes_of = scale_factors_of_rig(rig.as_dict())
     converted: list[Axis] = []
@@ -299,9 +298,9 @@ def replace_rig_quantity(
     base_scene : Scene
         Scene of the rig.
     quantity_name : str
-        Name of the quantity, in the form that axes with units use.
+        Name of the quantity, as it is used on axes with units.
     value : object
-        Value of the quantity, in the form that axes with units accept.
+        Value of the quantity, in any form that is accepted for axes with units.
 
     Returns
     -------

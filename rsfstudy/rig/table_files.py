@@ -1,4 +1,4 @@
-"""Reading of tables of numbers with units from files.
+"""Functions that read tables of numbers with units from files.
 
 `read_table` is the main function.
 """

@@ -59,10 +59,12 @@ class UsableColumns(NamedTuple):
     ----------
     names : tuple of str
         Names of the columns, in the order of the search. The function searches the headings for
-        each column. ``slip`` and ``displacement`` replace each other, and so do ``shear_stress``
-        and ``friction``. If one column of a pair has been found, the other column is not searched.
+        each column. The columns ``slip`` and ``displacement`` are alternatives, and so are
+        ``shear_stress`` and ``friction``. If the function has found one column of a pair, it does
+        not search for the other column.
     shear_stress_suffices : bool, default: False
-        If True and ``shear_stress`` has been found, ``normal_stress`` is not searched.
+        If True, the function does not search for ``normal_stress`` after it has found
+        ``shear_stress``.
     """
 
     names: tuple[str, ...]
@@ -110,7 +112,7 @@ def read_selected_columns(
         Heading and units of columns by name. If the value is None and the arrays in memory have no
         units, all columns are read.
     usable : UsableColumns
-        Columns that the function can use.
+        Columns that the calling function can use.
 
     Returns
     -------

@@ -83,7 +83,7 @@ def read_dataset(source: Source) -> Table:
     Returns
     -------
     Table
-        Table of the variables with one dimension.
+        Table of the one-dimensional variables.
     """
     return _build_table_of_dataset(source.origin)
 
@@ -115,7 +115,7 @@ def read_netcdf(source: Source) -> Table:
     Returns
     -------
     Table
-        Table of the variables with one dimension.
+        Table of the one-dimensional variables.
 
     Raises
     ------

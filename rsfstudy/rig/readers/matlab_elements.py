@@ -1,8 +1,7 @@
 """Numeric arrays in MATLAB files of versions 5 to 7.
 
-The functions check all lengths in the file. These functions are used in place of
-``scipy.io.loadmat``, because ``scipy.io.loadmat`` can crash the Python interpreter if a file is
-damaged.
+The functions of this module check all lengths in the file. They replace ``scipy.io.loadmat``, which
+can crash the Python interpreter if a file is damaged.
 """
 
 from __future__ import annotations

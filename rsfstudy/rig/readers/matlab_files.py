@@ -49,8 +49,9 @@ def read_matlab(source: Source) -> Table:
     Returns
     -------
     Table
-        Columns of equal length. If the arrays differ in length, the longest length that several
-        arrays share is used.
+        Columns of equal length. If the arrays differ in length, the table contains only the arrays
+        with the most common length. If several lengths are equally common, the longest of these
+        lengths is used.
 
     Raises
     ------

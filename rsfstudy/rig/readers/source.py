@@ -105,7 +105,8 @@ class Table:
         and the name of the quantity, and returns a ``Column``. The units of the column are an empty
         string unless the units follow from the type of the numbers.
     has_headings : bool, default: True
-        False if the columns have no headings. In this case, the headings are numbers from 1.
+        False if the columns have no headings. In this case, the headings are the column numbers,
+        counted from 1.
     default_units : bool, default: False
         True if no column has units. The columns are then in the default units.
     has_only_columns : bool, default: False

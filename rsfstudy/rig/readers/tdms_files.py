@@ -1,4 +1,4 @@
-"""Reader of TDMS files of LabVIEW."""
+"""Reader of TDMS files, which are written by LabVIEW."""
 
 from __future__ import annotations
 

@@ -226,7 +226,7 @@ def _split_header(line: str, delimiter: str, size: int) -> list[str]:
 
 
 def _split_in_several_ways(text: str, delimiter: str) -> Iterator[list[str]]:
-    """Split a header at several delimiters, beginning with the given delimiter."""
+    """Yield the headings of a header, split at each of several delimiters."""
     if delimiter == BLANKS:
         yield from _split_at_blanks(text)
     for mark in (delimiter, "\t", ";", ","):

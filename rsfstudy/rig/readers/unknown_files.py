@@ -46,7 +46,7 @@ def is_known_but_unreadable(source: Source) -> bool:
 
 
 def refuse_format(source: Source) -> NoReturn:
-    """Raise an error that contains the format of a file and the remedy.
+    """Raise an error that names the format of a file and suggests a remedy.
 
     Parameters
     ----------
