@@ -47,7 +47,7 @@ _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
 
 
 def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
-    """Reject a range or a repeated-value array that is too long.
+    """Reject a ``range`` or a zero-stride array that has too many items.
 
     Other checks iterate over all items of an argument, which would take too long. The maximum
     length is ``MAX_ITEMS_OF_LIST_ARGUMENT``.

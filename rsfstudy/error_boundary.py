@@ -163,7 +163,8 @@ def _wrap_in_error_boundary(
     If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
     stored in files, and the arguments are also checked against their annotations. The arguments are
     checked after the call, because the errors that the function itself raises are more specific. If
-    the function has an attribute ``convert_arguments``, this callable converts former arguments.
+    the function has the attribute ``convert_arguments``, this callable is used to convert
+    deprecated arguments.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")

@@ -181,7 +181,7 @@ class TableWithFormerColumns(pd.DataFrame):
 
     @property
     def _constructor(self) -> type[pd.DataFrame]:
-        """Class of the data frames that result from selections in the table."""
+        """Class of the data frames that selections from the table return."""
         return pd.DataFrame
 
     def _find_column(self, key: Any) -> Any:

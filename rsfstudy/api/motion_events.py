@@ -205,8 +205,9 @@ class InterpolatedMotionRows:
     def _find_stress_drop_rows(self, first_row: int, last_row: int) -> tuple[int, int]:
         """Return the rows that contain the stress drop of an event.
 
-        Without noise, shear stress rises until the first row and falls until the last row. With
-        noise, slip is faster than the arrest level between the rows.
+        Without noise, the first row is a maximum of shear stress, and the stress falls from there
+        until the last row. With noise, the slip rate is above the arrest level between the first
+        and the last row.
         """
         end, stress, rates = len(self._times) - 1, self._values[:, 2], self._values[:, 0]
         level, highest, lowest = self._arrest_slip_rate_level, first_row, last_row

@@ -1,4 +1,4 @@
-"""Copies of datasets for plots and tables of plain xarray."""
+"""Simplified copies of datasets for plotting and tabulating with plain xarray."""
 
 from __future__ import annotations
 
@@ -51,7 +51,11 @@ def _to_plain_value(values: xr.DataArray) -> Any:
 
 
 def _replace_units(attributes: dict[Any, Any]) -> dict[Any, Any]:
-    """Return attributes whose units are the scale of a variable, or no units for a pure number."""
+    """Return the attributes of a variable with readable units.
+
+    The scale of a normalised variable becomes its ``units`` attribute. For a dimensionless variable
+    without a scale, the ``units`` attribute is omitted.
+    """
     replaced = {name: value for name, value in attributes.items() if name != "scale"}
     if replaced.get("units") == "1":
         del replaced["units"]

@@ -203,7 +203,7 @@ class Axis:
         units: Mapping[str, str] | None = None,
         dimension: str = "sample",
     ) -> Axis:
-        """Draw samples of several fields as one dimension.
+        """Sample several fields jointly along a single dimension.
 
         Parameters
         ----------

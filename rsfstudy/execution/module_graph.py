@@ -117,12 +117,12 @@ class _Module:
 
     @cached_property
     def imports(self) -> list[tuple[str, list[str]]]:
-        """Modules of the package that this module imports, with the imported names."""
+        """Package modules imported by this module, with the imported names."""
         return _find_imports(self._code)
 
     @cached_property
     def lazy_exports(self) -> Mapping[str, str] | None:
-        """Modules that define the names that this module exports lazily.
+        """Modules from which this module lazily exports names.
 
         Each key is an exported name, and each value is the name of a module. If the module does not
         export names lazily, the value is None.

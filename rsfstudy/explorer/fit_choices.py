@@ -173,7 +173,7 @@ class FitChoices:
         return read_record(record, **limits) if limits else record
 
     def find_step(self, steps: Sequence[LoadingStep], time: float) -> int | None:
-        """Return the number of the step at an excluded time.
+        """Return the number of the step at a time that the user has excluded.
 
         Parameters
         ----------

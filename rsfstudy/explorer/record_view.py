@@ -240,7 +240,7 @@ class RecordView(View):
     # ---- fit ------------------------------------------------------------------------------------
 
     def _change_choices(self) -> None:
-        """Remove the fit, which is out of date, and update the code."""
+        """Remove the outdated fit, and update the displayed code."""
         self.jobs.cancel()
         self._show_fit(None)
 

@@ -1,4 +1,4 @@
-"""Data of the curves and maps of a selection of results.
+"""Data for the curves and maps that show a selection of results.
 
 The functions return arrays, and never draw a plot.
 """
@@ -105,14 +105,14 @@ def part_names(dataset: xr.Dataset, selection: Selection) -> list[str]:
 
 
 def shows_cells(dataset: xr.Dataset, variable: str) -> bool:
-    """Return True if each value of a variable belongs to one cell."""
+    """Return True if a variable has exactly one value per cell."""
     return {*dataset["status"].dims} <= {*dataset[variable].dims}
 
 
 def iterate_panels(dataset: xr.Dataset, selection: Selection) -> Iterator[Selection]:
-    """Yield one selection without a facet for each panel.
+    """Yield one selection per panel, with a fixed point of the facet dimension.
 
-    At most 12 points of the facet dimension are selected, at regular intervals.
+    At most 12 evenly spaced points of the facet dimension are used.
     """
     if not selection.facet:
         yield selection
@@ -165,11 +165,11 @@ def _arrays_of_panel(
 
 
 def curves_of_panel(dataset: xr.Dataset, panel: Selection) -> list[Curve]:
-    """Return the curves of a panel without a facet.
+    """Return the curves of a single panel.
 
-    If there are more than 40 curves, curves at regular intervals are returned. A curve with more
-    than 4,000 points is thinned: of each group of neighbouring points, the lowest point, the
-    highest point and the first failed cell are kept.
+    If a panel has more than 40 curves, only a regularly spaced subset of the curves is returned. A
+    curve with more than 4,000 points is thinned: of each group of neighbouring points, the lowest
+    point, the highest point and the first failed cell are kept.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def _x_values(
 
 
 def thin_curve(values: np.ndarray, status: np.ndarray | None = None) -> np.ndarray:
-    """Return the indices of the points of a curve that are drawn.
+    """Return the indices of the curve points that are drawn.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def thin_curve(values: np.ndarray, status: np.ndarray | None = None) -> np.ndarr
 
 
 def map_of_panel(dataset: xr.Dataset, panel: Selection) -> Map:
-    """Return the map of a panel without a facet.
+    """Return the map of a single panel.
 
     Parameters
     ----------

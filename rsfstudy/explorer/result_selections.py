@@ -76,7 +76,7 @@ def plotted_variables(dataset: xr.Dataset) -> list[str]:
 
 
 def list_x_choices(dataset: xr.Dataset, variable: str) -> list[str]:
-    """Return the names of the dimensions, coordinates and variables that can be along x.
+    """Return the names of all quantities that can be plotted along x.
 
     Besides the dimensions of the variable, the list contains the numeric coordinates along one of
     these dimensions. If the variable was recorded inside each cell, for example along an orbit, the

@@ -83,7 +83,7 @@ class SceneControls:
         self.show(settings)
 
     def show(self, settings: SceneSettings) -> None:
-        """Create the widgets again, for other settings.
+        """Recreate the widgets after the settings have changed.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class SceneControls:
         return f"{value * scale_in_units(self._rig, scale):.4g} {UNITS_BY_SCALE[scale]}"
 
     def _choose_units(self, units: str) -> None:
-        """Express the scene in the units of a rig, or without units."""
+        """Express the scene in rig units or in dimensionless form."""
         scene = self.settings.build_scene(self._rig)
         rig = None if units == "dimensionless" else Rig(**README_RIG)
         self.show(SceneSettings.from_scene(scene, rig))

@@ -62,7 +62,7 @@ class View(ABC):
     file_stem = "rsfstudy"
 
     def __init__(self, source: Any) -> None:
-        """Create the parts of the page that all views have."""
+        """Create the parts of the page that all views share."""
         self.source = source
         self.jobs = Jobs(self.show_warnings)
         self._alert = pn.pane.Alert("", alert_type="danger", visible=False)

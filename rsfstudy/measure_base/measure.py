@@ -4,10 +4,10 @@ A measure computes named results of one scene. Each result has a unit, and may h
 estimate. The class ``Measure`` runs the computation, checks the results, and counts the
 right-hand-side evaluations. To define a measure, derive a frozen dataclass from ``Measure``.
 
-Instances of measures are picklable, so Dask can send them to its workers. A measure also converts
-itself to plain data, so that a NetCDF file can store the definition of the measure. Fields that
-hold a number, a flag or a string may vary along an axis, in the same way as the fields of a scene.
-A field must not vary along an axis if the names of the results depend on the field.
+Instances of measures are picklable, so Dask can send them to its workers. A measure can also be
+converted to plain data, so that a NetCDF file can store its definition. Fields that hold a number,
+a flag or a string may vary along an axis, in the same way as the fields of a scene. A field must
+not vary along an axis if the names of the results depend on the field.
 """
 
 from __future__ import annotations
@@ -296,9 +296,9 @@ class Measure(ConstructorKeywordCheckMixin):
 
         The requested error of each result is the relative accuracy multiplied by the scale of the
         result. If the error estimate of a result is more than a hundred times the requested error,
-        the status of the cell becomes ``unverified``. Results without a scale are not checked. An
-        override should omit statistical results, and results whose resolution is an option of the
-        measure.
+        the status of the cell becomes ``unverified``. Results without a scale are not checked. A
+        method that overrides this one should omit statistical results, and results whose resolution
+        is set by an option of the measure.
 
         Parameters
         ----------
@@ -524,7 +524,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Create the field values that are not plain data from a description.
+        """Rebuild the fields that are not plain data from a measure description.
 
         Parameters
         ----------
@@ -598,7 +598,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
 
 
 def relative_work_at_accuracy(accuracy: Accuracy, work_by_digits: Mapping[float, float]) -> float:
-    """Return the cost of an accuracy relative to the cost of the default accuracy.
+    """Return the cost at a requested accuracy, relative to the default accuracy.
 
     The function interpolates costs that were measured for several numbers of digits.
 

@@ -185,7 +185,7 @@ def build_table_along_dimensions(
     caption: str = "",
     wrappable_columns: Collection[str] = (),
 ) -> TextTable:
-    """Build a table with one row for each combination of points on dimensions.
+    """Build a table with one row for each combination of coordinate values.
 
     Parameters
     ----------

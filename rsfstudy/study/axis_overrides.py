@@ -13,7 +13,7 @@ from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 
 
 def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
-    """Select points of a zipped axis by label or of a numbered axis by number.
+    """Select axis points by label (zipped axes) or by number (numbered axes).
 
     Parameters
     ----------

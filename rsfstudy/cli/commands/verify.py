@@ -150,9 +150,8 @@ def _write_agreement_figure(
 ) -> None:
     """Draw the number of agreeing digits of each quantity.
 
-    If the function compares a single file and the problem has an index column, such as time, the
-    figure shows the digits against this column. Otherwise the figure shows the digits against the
-    number of the problem.
+    For a single file whose problem has an index column, such as time, the figure shows the digits
+    against this column. Otherwise, the figure shows the digits against the problem number.
     """
     import numpy as np
 

@@ -38,9 +38,9 @@ _LOG_STEP_OF_DERIVATIVES = 1e-6
 class Boundary(Reduction):
     """Boundary between cells with values below and above a threshold.
 
-    The boundary is not interpolated. The result only shows that the boundary is between two
-    neighbouring cells. A cell is ignored if the difference between its value and the threshold does
-    not exceed the numerical error of the value.
+    The boundary is not interpolated: the reduction only finds the two neighbouring cells that
+    enclose the boundary. A cell is ignored if the difference between its value and the threshold
+    does not exceed the numerical error of the value.
 
     Parameters
     ----------
