@@ -127,7 +127,7 @@ def _rename_outputs(
 
 
 def rename_former_variables(dataset: xr.Dataset) -> xr.Dataset:
-    """Rename the variables of a dataset that have a former name.
+    """Rename the dataset variables that still have a former name.
 
     Parameters
     ----------

@@ -670,7 +670,7 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
 def recompute_cell(
     file: xr.Dataset | str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
-    """Recompute one cell of the results of a study in the current process.
+    """Recompute one cell of a results dataset in the current process.
 
     Exceptions that the computation raises are not caught, so that a debugger can inspect them.
 
@@ -742,7 +742,7 @@ def _find_cell_in_results_file(
     cell_coordinates: Mapping[str, Any],
     study_file: str | Path | None,
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
-    """Find a cell of the results of a study.
+    """Find one cell in the results of a study.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Import graph and code digests of the modules of rsfstudy.
+"""Import graph and code digests of the rsfstudy modules.
 
 The results of a cell depend on the modules that the measure and the parts of the scene import,
 directly or indirectly. ``ModuleGraph`` finds these modules by reading the source files and computes

@@ -336,7 +336,7 @@ def _is_selection_tool(tool: Any) -> bool:
 
 
 def _iterate_fitted_rows(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """Yield the curves of each fit of a dataset, with the style of its law."""
+    """Yield the curves of each fit in a dataset, in the line style of its law."""
     laws = dataset["law"].values.tolist()
     with style_context():
         colors = [cycle_style(number)["color"] for number in range(len(laws))]

@@ -130,7 +130,7 @@ def thin_points(size: int, most: int) -> np.ndarray:
 
 
 def describe_points(dataset: xr.Dataset, points: Mapping[str, int]) -> str:
-    """Describe the selected points of several dimensions in mathtext."""
+    """Describe the selected points of several dimensions as a mathtext label."""
     varied = [d for d in points if dataset.sizes[d] > 1]
     return ", ".join(
         describe_point(dataset.coords.to_dataset().isel({d: points[d]}), d) for d in varied

@@ -368,7 +368,7 @@ class MapPlot(Plot):
 
 
 def _image_of_map(found: Map) -> tuple[np.ndarray, list[tuple[float, float]]]:
-    """Return the image of a map, and its limits along x and y.
+    """Return the image of a map, and the limits of the image along x and y.
 
     If all cells have the same size on the axes, each pixel of the image is one cell.
     """

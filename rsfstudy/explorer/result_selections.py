@@ -191,7 +191,7 @@ def _check_choice(what: str, value: Any, choices: Sequence[str]) -> Any:
 
 
 def _default_x(dataset: xr.Dataset, variable: str, choices: Sequence[str]) -> str:
-    """Return the last dimension of the outputs, or else the longest dimension."""
+    """Return the last dimension inside the cells, or else the longest dimension."""
     if inner := [d for d in _inner_dimensions(dataset, variable) if d in choices]:
         return inner[-1]
     return max(reversed(choices), key=lambda name: dataset[name].size)

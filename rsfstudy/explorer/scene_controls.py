@@ -178,7 +178,7 @@ class SceneControls:
     # ---- widgets --------------------------------------------------------------------------------
 
     def _card(self, title: str, widgets: list[Any], collapsed: bool | None = None) -> pn.Card:
-        """Return a card, which is collapsed if it contains nothing but a selector."""
+        """Return a card, which is collapsed if a selector is its only content."""
         is_collapsed = len(widgets) == 1 if collapsed is None else collapsed
         return pn.Card(
             *widgets, title=title.replace("_", " ").capitalize(), collapsed=is_collapsed, width=285,

@@ -39,7 +39,7 @@ setTimeout(() => { button.label = "Copy" }, 1500)
 
 
 class View(ABC):
-    """Base class of a view, which adds code, downloads and messages to widgets and plots.
+    """Base class that adds code, downloads and messages to the widgets of a view.
 
     A subclass creates its widgets in ``__init__``, and implements the abstract methods. The
     subclass calls ``refresh`` after each change to its widgets. To handle errors of computations,

@@ -100,12 +100,12 @@ class Measure(ConstructorKeywordCheckMixin):
     number for each name in ``outputs``. For each output with ``error=True``, the mapping also
     contains an error estimate with the name ``<name>_error``.
 
-    The argument ``integrator`` is an ``rsfstudy.Integrator``. It contains the requested relative
-    accuracy, ``integrator.rtol``, counts right-hand-side evaluations, and stops a motion that
-    exceeds the work budget. To compute a motion, pass the integrator to ``rsfstudy.simulate``:
+    The argument ``integrator`` is an ``rsfstudy.Integrator``. The integrator stores the requested
+    relative accuracy as ``integrator.rtol``, counts right-hand-side evaluations, and stops a motion
+    that exceeds the work budget. To compute a motion, pass the integrator to ``rsfstudy.simulate``:
     ``rsfstudy.simulate(scene, integrator=integrator)``. The functions ``rsfstudy.critical_step``
-    and ``rsfstudy.limit_cycle`` also take ``integrator=integrator``. To use the outcome of another
-    measure, call the ``run_nested`` method of that measure. To estimate errors, repeat the
+    and ``rsfstudy.limit_cycle`` also accept the argument ``integrator``. To use the outcome of
+    another measure, call the ``run_nested`` method of that measure. To estimate errors, repeat the
     computation with ``integrator.refined()``, whose tolerances are ten times smaller.
 
     Override ``error_scales`` to set the status to ``unverified`` if the error estimates are far too

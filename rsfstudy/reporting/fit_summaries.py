@@ -172,7 +172,7 @@ def _describe_window(fit: xr.Dataset) -> str:
 
 
 def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
-    """Format a fitted parameter with its standard error.
+    """Format the value of a fitted parameter with its standard error.
 
     The value and the error are rounded to two significant digits of the error.
 

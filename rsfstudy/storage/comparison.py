@@ -334,8 +334,8 @@ def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, s
 def _compare_numbers_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
     """Compare the numeric variables in the cells that both datasets share.
 
-    If the primary output has no error estimates, every cell in which its two values differ is
-    counted in ``beyond_errors``.
+    If the primary output has no error estimates, each of its values that differs is counted in
+    ``beyond_errors``.
     """
     frame = compare_same_lattice(*shared_cells)
     about = find_primary_output(shared_cells[0])

@@ -241,7 +241,7 @@ class Study:
     def scene_field_names(self) -> frozenset[str]:
         """Names of all fields that determine the scene of a cell.
 
-        In a study with a rig, the set also contains the axis fields with units.
+        If the study has a rig, the set also contains the axis fields that have units.
         """
         return frozenset({*self.scene_fields, *self.units})
 

@@ -1,7 +1,8 @@
 """Reductions that find boundaries and level crossings.
 
-A ``Boundary`` is located between cells with values below and above a threshold. An ``Inverse``
-interpolates a smooth variable to find the coordinate value at which the variable reaches a level.
+A ``Boundary`` lies between two neighbouring cells whose values are on opposite sides of a
+threshold. An ``Inverse`` interpolates a smooth variable to find the coordinate value at which the
+variable reaches a level.
 """
 
 from __future__ import annotations
@@ -328,7 +329,7 @@ def _crossing_position_derivatives(
 ) -> np.ndarray:
     """Return the derivatives of the crossing position.
 
-    The derivatives are 0 if there is no crossing.
+    All derivatives are 0 if the curve does not cross the level.
     """
     x, y, places = _take_logs_of_positive_samples(values, coordinate)
     slopes = np.zeros(values.size)

@@ -104,7 +104,7 @@ class Difference(Reduction):
         return xr.ones_like(values), -xr.ones_like(values)
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """Return the larger of the status codes of each point and the reference point.
+        """Combine the status of each point with the status of the reference point.
 
         Parameters
         ----------
