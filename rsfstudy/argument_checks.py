@@ -451,7 +451,7 @@ def _iterate_nested_values(value: object, nesting_levels: int) -> Iterator[Any]:
 
 
 def _is_too_long_lazy_sequence(value: Any) -> bool:
-    """Return True if a lazy sequence has more than ``MAX_ITEMS_OF_LIST_ARGUMENT`` items.
+    """Return True if a lazy sequence exceeds ``MAX_ITEMS_OF_LIST_ARGUMENT`` items.
 
     A lazy sequence is a ``range``, or an array with a stride of zero. The memory of a lazy sequence
     does not grow with the number of items.

@@ -1,4 +1,4 @@
-"""Formatting of numbers, lists and settings as text, for tables, titles and messages."""
+"""Text formatting of numbers, lists and settings for tables and messages."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def _rename_reduction_fields(
 def _rename_outputs(
     fields: dict[str, Any], keys: tuple[str, ...], outputs: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Replace the former names of outputs in the values of the given fields."""
+    """Replace former output names that occur as values of the given fields."""
     for key in keys:
         if isinstance(name := fields.get(key), str):
             fields[key] = outputs.get(name, name)

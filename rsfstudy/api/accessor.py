@@ -349,7 +349,7 @@ class DatasetAccessor:
 
     @error_boundary
     def holds(self) -> xr.Dataset:
-        """Measure frictional healing and relaxation in all holds of a motion.
+        """Measure frictional healing and relaxation during each hold of a motion.
 
         Returns
         -------

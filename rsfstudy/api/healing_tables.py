@@ -82,7 +82,7 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
 
 
 def measure_motion_holds(motion: xr.Dataset) -> xr.Dataset:
-    """Measure healing and relaxation in the holds of a motion.
+    """Measure frictional healing and relaxation during the holds of a motion.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ def simplify_dataset(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _is_constant(values: xr.DataArray) -> bool:
-    """Return True if all values of a coordinate are equal, or if all values are missing."""
+    """Return True if all values of a coordinate are equal or all are missing."""
     return bool(values.size) and len(np.unique(values.values.astype(str))) == 1
 
 

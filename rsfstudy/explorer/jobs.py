@@ -43,7 +43,7 @@ def route_warnings_to_pages() -> None:
 
 @contextmanager
 def collected_warnings() -> Iterator[list[str]]:
-    """Collect the warnings that this thread issues in the body of a ``with`` statement.
+    """Collect the warnings that this thread issues during a ``with`` block.
 
     Yields
     ------

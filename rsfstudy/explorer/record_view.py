@@ -284,7 +284,7 @@ class RecordView(View):
     # ---- code and downloads ---------------------------------------------------------------------
 
     def python_code(self) -> str:
-        """Return Python code that reads the record, fits it and prints the table of the fit."""
+        """Return Python code that reads and fits the record, and prints the fit table."""
         path, lines = self._path, ["import rsfstudy", ""]
         source = json.dumps(path) if path else "record"
         if not path:

@@ -93,7 +93,7 @@ def error_name(dataset: xr.Dataset, variable: str) -> str:
 
 
 def part_names(dataset: xr.Dataset, selection: Selection) -> list[str]:
-    """Return the names of the variables that a selection shows.
+    """Return the names of the variables displayed by a selection.
 
     The list contains the plotted variable, its error estimate, the variable on the x axis, the
     status and the message.
@@ -140,7 +140,7 @@ def describe_points(dataset: xr.Dataset, points: Mapping[str, int]) -> str:
 def _arrays_of_panel(
     dataset: xr.Dataset, panel: Selection, dimensions: Sequence[str]
 ) -> tuple[np.ndarray, ...]:
-    """Return values, errors, statuses and cell numbers along the dimensions of a panel."""
+    """Return the values, errors, statuses and cell numbers shown in a panel."""
     lattice, error = dataset["status"], error_name(dataset, panel.variable)
     status, cells = xr.DataArray(int(Status.OK)), xr.DataArray(-1)
     if shows_cells(dataset, panel.variable):

@@ -99,12 +99,12 @@ def list_x_choices(dataset: xr.Dataset, variable: str) -> list[str]:
 
 
 def _inner_dimensions(dataset: xr.Dataset, variable: str) -> list[str]:
-    """Return the dimensions of a variable that are not dimensions of the lattice."""
+    """Return the dimensions of a variable that do not belong to the lattice."""
     return [str(d) for d in dataset[variable].dims if d not in dataset["status"].dims]
 
 
 def dimension_along_x(dataset: xr.Dataset, variable: str, x: str) -> str:
-    """Return the dimension of the points along x."""
+    """Return the dimension that is plotted along x."""
     if x in dataset[variable].dims:
         return x
     inner = _inner_dimensions(dataset, variable)

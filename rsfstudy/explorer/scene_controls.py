@@ -209,7 +209,7 @@ class SceneControls:
         ]
 
     def _fields_of_rig(self) -> set[str]:
-        """Return the fields that have no widget because the rig or a menu sets them."""
+        """Return the fields that the rig or a menu sets, and that need no widget."""
         if self._rig is None:
             return {"inertia"}
         return _FIELDS_OF_RIG - (set() if "stiffness" in self.settings.rig else _STIFFNESS)

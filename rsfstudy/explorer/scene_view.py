@@ -89,7 +89,7 @@ class Result(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Sentences about the stability of steady sliding and about the end of the motion."""
+        """Sentences about the stability of steady sliding and the end of the motion."""
         sentences = [text for text in self.summary if isinstance(text, str)]
         status, message = self.motion.attrs["status"], self.motion.attrs["message"]
         ending = "" if status == "ok" else f" Motion: {status}. {message}"

@@ -278,7 +278,7 @@ class View(ABC):
 
     @contextmanager
     def errors_shown(self) -> Iterator[None]:
-        """Show the message of an error that is raised in the body of a ``with`` statement.
+        """Show the message of any error that is raised inside a ``with`` block.
 
         Yields
         ------

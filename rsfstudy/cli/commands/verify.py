@@ -45,7 +45,7 @@ class Verification(CommandResult):
 
 
 def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, Any]:
-    """Return the part of the JSON output that describes one answer file."""
+    """Return the entry of the JSON output that describes one answer file."""
     problem = comparison.problem
     index = problem.index_values if problem.index_column else None
     return {
