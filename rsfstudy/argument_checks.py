@@ -47,7 +47,7 @@ _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
 
 
 def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
-    """Reject a range or a repeated-value array that is too long.
+    """Reject a ``range`` or a zero-stride array that has too many items.
 
     Other checks iterate over all items of an argument, which would take too long. The maximum
     length is ``MAX_ITEMS_OF_LIST_ARGUMENT``.
@@ -451,7 +451,7 @@ def _iterate_nested_values(value: object, nesting_levels: int) -> Iterator[Any]:
 
 
 def _is_too_long_lazy_sequence(value: Any) -> bool:
-    """Return True if a lazy sequence has more than ``MAX_ITEMS_OF_LIST_ARGUMENT`` items.
+    """Return True if a lazy sequence exceeds ``MAX_ITEMS_OF_LIST_ARGUMENT`` items.
 
     A lazy sequence is a ``range``, or an array with a stride of zero. The memory of a lazy sequence
     does not grow with the number of items.

@@ -1,9 +1,8 @@
 """Error boundary of the public functions and classes.
 
-Every exception that leaves a public function is an instance of an error class of rsfstudy. The
-error message contains the invalid argument, the rule that the argument breaks, and the remedy.
-Calls from within rsfstudy bypass the boundary, so that the error refers to the function that the
-user called.
+Every exception raised by a public function is an instance of an rsfstudy error class. The error
+message contains the invalid argument, the rule that the argument breaks, and the remedy. Calls from
+within rsfstudy bypass the boundary, so that the error refers to the function that the user called.
 """
 
 from __future__ import annotations
@@ -81,9 +80,9 @@ def wrap_methods_in_error_boundary(guarded_class: GuardedClass) -> GuardedClass:
     """Apply the error boundary to the constructor and the public methods.
 
     The wrapped constructor also rejects arguments that do not match their annotations. Most
-    dataclasses store any argument, so a wrong argument would cause an error much later. Static
-    methods are not wrapped, because the engines compile the static methods of friction laws and
-    other model components.
+    dataclasses accept any argument, so without this check a wrong argument would cause an error
+    much later. Static methods are not wrapped, because the engines compile the static methods of
+    friction laws and other model components.
 
     Parameters
     ----------
@@ -163,7 +162,8 @@ def _wrap_in_error_boundary(
     If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
     stored in files, and the arguments are also checked against their annotations. The arguments are
     checked after the call, because the errors that the function itself raises are more specific. If
-    the function has an attribute ``convert_arguments``, this callable converts former arguments.
+    the function has the attribute ``convert_arguments``, this callable is used to convert
+    deprecated arguments.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")

@@ -1,4 +1,4 @@
-"""Formatting of numbers, lists and settings as text, for tables, titles and messages."""
+"""Text formatting of numbers, lists and settings for tables and messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LONG_DECIMAL_NUMBER_PATTERN = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?"
 
 
 def read_flag_meanings(attributes: Mapping[str, Any]) -> dict[float, str]:
-    """Return the meaning of each flag value, from CF attributes.
+    """Read the meaning of each flag value from CF attributes.
 
     Parameters
     ----------

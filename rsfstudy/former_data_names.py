@@ -119,7 +119,7 @@ def _rename_reduction_fields(
 def _rename_outputs(
     fields: dict[str, Any], keys: tuple[str, ...], outputs: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Replace the former names of outputs in the values of the given fields."""
+    """Replace former output names that occur as values of the given fields."""
     for key in keys:
         if isinstance(name := fields.get(key), str):
             fields[key] = outputs.get(name, name)
@@ -127,7 +127,7 @@ def _rename_outputs(
 
 
 def rename_former_variables(dataset: xr.Dataset) -> xr.Dataset:
-    """Rename the variables of a dataset that have a former name.
+    """Rename the dataset variables that still have a former name.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ class TableWithFormerColumns(pd.DataFrame):
 
     @property
     def _constructor(self) -> type[pd.DataFrame]:
-        """Class of the data frames that result from selections in the table."""
+        """Class of the data frames that selections from the table return."""
         return pd.DataFrame
 
     def _find_column(self, key: Any) -> Any:

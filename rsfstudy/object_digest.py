@@ -2,9 +2,9 @@
 
 A digest identifies functions, classes and data by their content. The digest of a function is
 computed from its compiled code, so comments, docstrings and line numbers do not affect the digest.
-The digest of a function includes every object whose name the function uses. If a function is
-defined in a study file, a script, a notebook or a worker process, its digest is the same. The
-digest does not include modules that a function imports inside its body.
+The digest of a function also includes every object that the function refers to by name. The digest
+of a function is the same whether the function is defined in a study file, a script, a notebook or a
+worker process. The digest does not include modules that a function imports inside its body.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class ObjectDigest:
             self._sha256.update(text.encode(errors="surrogatepass") + b"\0")
 
     def _is_first_visit(self, key: Hashable, value: Any) -> bool:
-        """Return True if an object is new, or add the number of its first visit."""
+        """Return True for a new object; otherwise, add the number of its first visit."""
         if key in self._visited:
             self._add_texts(f"object {self._visited[key][0]}")
             return False
@@ -137,7 +137,7 @@ class ObjectDigest:
             self._add_state_of_instance(value, used_names)
 
     def _add_module(self, module: ModuleType, used_names: Iterable[str]) -> None:
-        """Add the members of a module that the code uses."""
+        """Add the module members that the code uses to the digest."""
         if not self._reads_module(module.__name__):
             self._add_texts(module.__name__)
         elif self._is_first_visit((id(module), *used_names), module):
@@ -191,8 +191,8 @@ class ObjectDigest:
 class _PicklerWithoutCachedProperties(pickle.Pickler):
     """Pickler that omits the cached properties of all objects.
 
-    Cached properties do not affect the results. They may be present in one process and absent in
-    another process.
+    Cached properties do not affect the results. Cached properties may be present in one process and
+    absent in another.
     """
 
     def reducer_override(self, value: Any) -> Any:

@@ -22,7 +22,7 @@ from rsfstudy.slider import SceneFields
 def _read_vocabulary() -> Iterator[Quantity]:
     """Yield the quantities of the file ``vocabulary.csv``.
 
-    The file contains no fields of scenes. The file lists quantities of scenes and rigs first, then
+    The file does not list scene fields. The file lists quantities of scenes and rigs first, then
     quantities of measures and motions, then quantities of reductions, and finally quantities that
     every lattice has. Datasets and pages list the quantities in the order of the file.
     """

@@ -39,7 +39,7 @@ _NOT_AN_RSFSTUDY_DATASET_MESSAGE = (
 class DatasetAccessor:
     """Accessor for datasets that rsfstudy has created.
 
-    The accessor is available as ``dataset.rsf``. The dataset is a motion, a critical step or a
+    The accessor is available as ``dataset.rsf``. The dataset may contain a motion, critical step or
     limit cycle of one scene, a fit of laboratory records, or the results of a study.
 
     Parameters
@@ -106,7 +106,7 @@ class DatasetAccessor:
     @property
     @error_boundary
     def rig(self) -> Rig:
-        """Rig of a fit, for the conversion of motions to the units of the record.
+        """Rig of a fit, used to convert motions to the units of the record.
 
         The slip distance and the stiffness of the rig are the fitted values. The reference velocity
         of the rig is the load point velocity before the step. The normal stress of the rig is the
@@ -135,7 +135,7 @@ class DatasetAccessor:
     def study(self) -> Study:
         """Study that produced the dataset.
 
-        The study always contains all cells, even if only some cells of the dataset are selected.
+        The study is always complete, even if the dataset contains only a selection of its cells.
 
         Returns
         -------
@@ -349,7 +349,7 @@ class DatasetAccessor:
 
     @error_boundary
     def holds(self) -> xr.Dataset:
-        """Measure frictional healing and relaxation in all holds of a motion.
+        """Measure frictional healing and relaxation during each hold of a motion.
 
         Returns
         -------
@@ -440,7 +440,7 @@ class DatasetAccessor:
 
     @error_boundary
     def simplify(self) -> xr.Dataset:
-        """Return a copy that is suitable for plots and tables of plain xarray.
+        """Return a simplified copy for plotting and tabulating with plain xarray.
 
         Returns
         -------
@@ -576,7 +576,8 @@ class DatasetAccessor:
         """Return a table of the cells without a result.
 
         The table contains failed cells, and also cells whose status is an answer without a value,
-        such as ``unstable_at_any_step``. The property ``Status.is_answer`` distinguishes the two.
+        such as ``unstable_at_any_step``. The property ``Status.is_answer`` distinguishes failed
+        cells from cells with an answer.
 
         Returns
         -------

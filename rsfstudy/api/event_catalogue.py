@@ -94,7 +94,7 @@ def build_event_catalogue(
 def _build_unit_attributes(
     scale: str, variable_attributes: Mapping[str, Mapping[Any, Any]]
 ) -> dict[str, str]:
-    """Return the attributes ``units`` and ``scale`` of a quantity of an event.
+    """Return the attributes ``units`` and ``scale`` of an event quantity.
 
     Times, slips and stresses have the units of the corresponding variable of the record. The units
     of a slip rate are the units of slip divided by the units of time. All other quantities are
@@ -354,7 +354,7 @@ def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
 
 
 def _name_displacement(dataset: xr.Dataset) -> xr.Dataset:
-    """Rename the times of a catalogue if the record contains no time."""
+    """Rename ``time`` to ``displacement`` in the catalogue of a record without time."""
     words = {
         "time": "displacement at the beginning of the event",
         "duration": "displacement during the event",
@@ -367,7 +367,7 @@ def _name_displacement(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:
-    """Return the sign that shear stress in the direction of slip has in a record.
+    """Return the sign that a record uses for shear stress in the slip direction.
 
     If the user does not pass a sign, the sign is -1 if all samples of shear stress are negative,
     and 1 otherwise.

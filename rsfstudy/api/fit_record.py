@@ -565,7 +565,7 @@ def _free_parameters(
 
 
 def _describe_filter(averaging: Any, low_pass: str) -> str:
-    """Return the filter of friction in the string format of the measure ``Fit``.
+    """Return the friction filter in the string format used by ``Fit``.
 
     The string contains the type of the filter and its duration in s or frequency in Hz. The string
     is empty if the user passes neither ``averaging`` nor ``low_pass``.

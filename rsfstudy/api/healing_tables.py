@@ -82,7 +82,7 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
 
 
 def measure_motion_holds(motion: xr.Dataset) -> xr.Dataset:
-    """Measure healing and relaxation in the holds of a motion.
+    """Measure frictional healing and relaxation during the holds of a motion.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def _find_constant_velocity_segments(
 
 
 def _with_units_of_motion(table: xr.Dataset, motion: xr.Dataset) -> xr.Dataset:
-    """Return a table of holds with the units of a motion."""
+    """Return a table of holds in the units of a motion."""
     time, moved = (motion[name].attrs for name in ("time", "load_point_displacement"))
     rate = motion["slip_rate"].attrs if "slip_rate" in motion else {"units": "1", "scale": "V_*"}
     sources = {"begins": time, "duration": time, "velocity_before": rate, "velocity_after": rate}

@@ -51,7 +51,7 @@ _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class _ResultSection:
-    """Section about a results file, and the row of the file in the summary."""
+    """Report section about one results file, with the summary row of the file."""
 
     path: Path
     title: str = ""
@@ -354,7 +354,7 @@ def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -
 def _png_width_in_inches(image: bytes) -> float:
     """Return the width in inches at which a PNG image is printed.
 
-    The page scales all figures by this width, so that letters have the same size in all figures.
+    The page scales all figures by this width, so that text has the same size in all figures.
     """
     at = image.find(b"pHYs") + 4
     pixels, per_metre = (int.from_bytes(image[n : n + 4]) for n in (16, at))

@@ -92,8 +92,8 @@ def find_motion_events(
 def _arrest_level(motion: xr.Dataset, scene: Callable[[], Scene]) -> float | None:
     """Return the logarithm (base 10) of the slip rate at which events end.
 
-    In a scene with noise, an event ends when the slip rate falls below the lowest load point
-    velocity above zero. In other scenes, the function returns None.
+    In a scene with noise, an event ends when the slip rate falls below the smallest nonzero load
+    point velocity. In other scenes, the function returns None.
     """
     if json.loads(motion.attrs.get("scene", "{}")).get("noise", "none") == "none":
         return None
@@ -205,8 +205,9 @@ class InterpolatedMotionRows:
     def _find_stress_drop_rows(self, first_row: int, last_row: int) -> tuple[int, int]:
         """Return the rows that contain the stress drop of an event.
 
-        Without noise, shear stress rises until the first row and falls until the last row. With
-        noise, slip is faster than the arrest level between the rows.
+        Without noise, the two rows are the local maximum of shear stress before the event and the
+        local minimum after the event. With noise, they are the nearest rows before and after the
+        event in which the slip rate does not exceed the arrest level.
         """
         end, stress, rates = len(self._times) - 1, self._values[:, 2], self._values[:, 0]
         level, highest, lowest = self._arrest_slip_rate_level, first_row, last_row
@@ -223,11 +224,11 @@ class InterpolatedMotionRows:
         return highest, lowest
 
     def _interpolate_after_row(self, row: int, row_count: int) -> KroghInterpolator:
-        """Interpolate around the interval between a row and the next row.
+        """Interpolate the motion near the interval between a row and the next row.
 
         The interpolating polynomial is a function of the time since the first row of the interval.
-        Half of the interpolated rows precede the interval. If the motion has a discontinuity near
-        the interval, rows beyond the discontinuity are not used.
+        Half of the rows used for the interpolation precede the interval. If the motion has a
+        discontinuity near the interval, rows beyond the discontinuity are not used.
         """
         first = max(row + 1 - row_count // 2, 0)
         last = min(row + row_count // 2, len(self._times) - 1)
@@ -274,7 +275,7 @@ class InterpolatedMotionRows:
         return many, error + self._is_too_coarse_to_interpolate(sides) * np.array(left)
 
     def _read_time_and_slip_at_end_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return time and slip at the first or the last row, with errors of zero."""
+        """Return the time and slip in the first or last row, with zero errors."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
     def find_extreme(self, row: int, column: int, sign: float) -> tuple[np.ndarray, np.ndarray]:

@@ -78,10 +78,10 @@ def _print_progress_lines(
 ) -> ProgressCallback:
     """Return a function that prints progress lines for log files and pipes.
 
-    The function prints the estimated time of a long run once, as soon as the first cells determine
-    it. In addition, the function prints at most one line per tenth of the cells. The time between
-    two lines is at least ten seconds, except that the last line is always printed. A short run
-    therefore prints a single line.
+    For a long run, the function prints the estimated time once, after the first cells have been
+    computed. In addition, the function prints a progress line at most once per 10 % of the cells.
+    Progress lines are printed at least ten seconds apart, except for the last line, which is always
+    printed. A short run therefore prints a single line.
     """
     began = said = time.monotonic()
     told, is_estimated = 0, False
@@ -115,8 +115,8 @@ def compile_scenes_with_notice(
 ) -> None:
     """Compile the equations of scenes, and print the compilation time.
 
-    The compilation precedes the first cell, so that measured times of cells do not include the
-    compilation.
+    The equations are compiled before the first cell is computed, so the measured cell times do not
+    include the compilation.
 
     Parameters
     ----------

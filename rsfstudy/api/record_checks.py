@@ -62,7 +62,7 @@ def check_displacement_was_not_reset(record: Record) -> None:
 def check_displacement_is_not_slip(
     records: Sequence[Record], step_numbers: Sequence[int], ratio: float, machine: float
 ) -> None:
-    """Raise an error if the displacement of a record is the slip of the fault.
+    """Raise an error if the displacement column of a record contains fault slip.
 
     Parameters
     ----------

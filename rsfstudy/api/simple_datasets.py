@@ -1,4 +1,4 @@
-"""Copies of datasets for plots and tables of plain xarray."""
+"""Simplified copies of datasets for plotting and tabulating with plain xarray."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def simplify_dataset(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _is_constant(values: xr.DataArray) -> bool:
-    """Return True if all values of a coordinate are equal, or if all values are missing."""
+    """Return True if all values of a coordinate are equal or all are missing."""
     return bool(values.size) and len(np.unique(values.values.astype(str))) == 1
 
 
@@ -51,7 +51,11 @@ def _to_plain_value(values: xr.DataArray) -> Any:
 
 
 def _replace_units(attributes: dict[Any, Any]) -> dict[Any, Any]:
-    """Return attributes whose units are the scale of a variable, or no units for a pure number."""
+    """Return the attributes of a variable with readable units.
+
+    The scale of a normalised variable becomes its ``units`` attribute. For a dimensionless variable
+    without a scale, the ``units`` attribute is omitted.
+    """
     replaced = {name: value for name, value in attributes.items() if name != "scale"}
     if replaced.get("units") == "1":
         del replaced["units"]

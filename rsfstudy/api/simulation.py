@@ -389,7 +389,7 @@ def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, An
 
 
 def _build_state_variable_quantity(state_number: int) -> Quantity:
-    """Return the quantity of a single state, for laws with several states."""
+    """Return the quantity of one state variable of a law with several states."""
     about = (
         f"contribution of state {state_number} of the law to the friction coefficient, without "
         "changes due to stress"
@@ -483,8 +483,8 @@ def make_row_times_strictly_increasing(table: np.ndarray) -> np.ndarray:
     The first row of a regime (form of the equations of motion) has the same time as the last row of
     the previous regime. The first row of a segment of the loading has the same time as the last row
     of the previous segment. If the two rows are equal, the first row is removed. Otherwise, the
-    time of the second row is increased by a few spacings of floating-point numbers. If a rupture is
-    shorter than the spacing of floating-point numbers, the times of its rows are also increased.
+    time of the second row is increased by a few units in the last place. If a rupture is too short
+    for its times to differ in floating-point arithmetic, the times of its rows are also increased.
 
     Parameters
     ----------

@@ -260,8 +260,8 @@ def _measure_scene_to_dataset(
     """Compute a measure of a scene, and return the outputs as a dataset.
 
     The variables have the same names as in the results of studies. Outputs without a value are NaN.
-    If ``is_nested`` is True, the results are used by a different measure. In this case, the
-    function does not emit warnings, and its evaluations are added to the count of the integrator.
+    Pass ``is_nested=True`` if another measure uses the results. The function then emits no
+    warnings, and adds its evaluations to the count of the integrator.
     """
     check_scene(scene)
     check_integrator(integrator)

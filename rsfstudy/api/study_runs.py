@@ -232,7 +232,7 @@ def run(
 def apply_overrides_to_study(
     study: str | Path | Study, overrides: Mapping[str, Any], **accuracy_fields: Any
 ) -> Study:
-    """Return a study with overrides of its values and its accuracy.
+    """Return a copy of a study with overridden values and accuracy settings.
 
     Parameters
     ----------
@@ -384,7 +384,7 @@ def read_results(path: Path) -> xr.Dataset:
 
 
 def _open_dataset_if_name_or_path(dataset: xr.Dataset | str | Path) -> xr.Dataset:
-    """Return results, and load the results first if a name or a path is passed."""
+    """Return a results dataset, loading the results if a name or path is passed."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
     StoredDataset(dataset).check_contains_study_results("the dataset")
@@ -670,7 +670,7 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
 def recompute_cell(
     file: xr.Dataset | str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
-    """Recompute one cell of the results of a study in the current process.
+    """Recompute one cell of a results dataset in the current process.
 
     Exceptions that the computation raises are not caught, so that a debugger can inspect them.
 
@@ -742,7 +742,7 @@ def _find_cell_in_results_file(
     cell_coordinates: Mapping[str, Any],
     study_file: str | Path | None,
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
-    """Find a cell of the results of a study.
+    """Find one cell in the results of a study.
 
     Returns
     -------

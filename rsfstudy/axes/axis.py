@@ -25,7 +25,7 @@ AxisRow = Mapping[str, Any]
 
 
 def fields_of_axis_point(axis_point: Any) -> Any:
-    """Return the field values of an axis point, which may be a mapping or a rig.
+    """Return the field values of an axis point that is given as a mapping or a rig.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class Axis:
         units: Mapping[str, str] | None = None,
         dimension: str = "sample",
     ) -> Axis:
-        """Draw samples of several fields as one dimension.
+        """Sample several fields jointly along a single dimension.
 
         Parameters
         ----------
@@ -392,7 +392,7 @@ class Axis:
         return Axis(self.dimension, self._values_for_constructor(rows), units, sampling_info)
 
     def _values_for_constructor(self, rows: Sequence[AxisRow]) -> Any:
-        """Convert the rows to the format of the argument ``values`` of ``Axis``."""
+        """Convert the rows to the format that ``Axis`` accepts as ``values``."""
         if self.labels is not None:
             return {label: dict(row) for label, row in zip(self.labels, rows, strict=True)}
         if self.has_numbered_points:

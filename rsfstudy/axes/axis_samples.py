@@ -1,4 +1,4 @@
-"""Random samples and tables of cases for the creation of axes.
+"""Random samples and tables of cases from which axes are created.
 
 The quantile functions of the distributions convert points in the unit cube to samples. See
 `Axis.samples` and `Axis.cases`.
@@ -351,7 +351,8 @@ def check_draws_have_units(
 ) -> None:
     """Check that draws of a fitted slip distance or stiffness have units.
 
-    Fits are in um, but fields without units are in SI units.
+    Fitted values are in um or MPa/um, whereas field values without units are assumed to be in SI
+    units.
 
     Parameters
     ----------

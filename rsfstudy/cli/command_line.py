@@ -137,12 +137,12 @@ _LOG_HANDLER = _WarnOnceHandler(logging.WARNING)
 
 def _print_warning(message: Warning | str) -> None:
     # The console is not used here, because the warning would overwrite a progress bar.
-    """Print a warning on the standard error."""
+    """Print a warning to the standard error."""
     print(escape_control_characters(shorten_text(f"warning: {message}", 5000)), file=sys.stderr)
 
 
 def _print_error(text: str) -> None:
-    """Print an error message on the standard error."""
+    """Print an error message to the standard error."""
     from rsfstudy.cli.console import stderr_console
 
     stderr_console.print(text)

@@ -1,4 +1,4 @@
-"""Consoles for plain text on the standard output and the standard error."""
+"""Consoles that print plain text to the standard output and the standard error."""
 
 from __future__ import annotations
 

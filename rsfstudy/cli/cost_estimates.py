@@ -178,7 +178,7 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
 
 
 def _timings_match_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
-    """Return True if timings were measured at the accuracy and engine of a plan."""
+    """Return True if timings were measured with the accuracy and engine of a plan."""
     asked = cell_plan.study.accuracy
     return cell_timings.fingerprint.get("rtol") == asked.rtol and cell_timings.fingerprint.get(
         "engine"
@@ -186,7 +186,7 @@ def _timings_match_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTi
 
 
 def describe_missing_engine_packages(engine_name: str) -> str:
-    """Describe the missing packages of an engine.
+    """Describe the packages that an engine requires but that are missing.
 
     Parameters
     ----------

@@ -22,8 +22,8 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
     """Write the table of a dataset to a CSV file.
 
     The header contains the name and the units of each column, in a form that ``read_table`` can
-    read. Numbers are written with full precision. For the results of a study, codes are written as
-    labels.
+    read. Numbers are written with full precision. In the table of a study, integer codes such as
+    the status are written as labels.
 
     Parameters
     ----------

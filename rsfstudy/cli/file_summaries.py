@@ -24,7 +24,7 @@ from rsfstudy.status import Status
 
 @dataclass(frozen=True)
 class FileSummary(CommandResult):
-    """Dataset in a file, as the command ``show`` displays the dataset.
+    """Dataset in a file, prepared for display by the command ``show``.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def print_line(text: str, style: str = "", soft_wrap: bool = False) -> None:
-    """Print a text on the standard output.
+    """Print text to the standard output.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def print_line(text: str, style: str = "", soft_wrap: bool = False) -> None:
 
 
 def print_note(text: str) -> None:
-    """Print a text on the standard error.
+    """Print text to the standard error.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ _MAX_PRINTED_AXIS_POINTS = 40
 
 @dataclass(frozen=True)
 class StudyDeclaration(CommandResult):
-    """Declaration of a study, as the command ``show`` displays it.
+    """Declaration of a study, prepared for display by the command ``show``.
 
     Parameters
     ----------

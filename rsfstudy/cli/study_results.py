@@ -53,7 +53,7 @@ class StudyResults:
 
     @property
     def overrides(self) -> Mapping[str, Any]:
-        """Values that differ from the declaration of the study."""
+        """Overridden values, which differ from the declaration of the study."""
         return StoredDataset(self.dataset).declaration.overrides
 
     @property

@@ -1,10 +1,10 @@
 """Execution of studies: planning, computing and recording of cells.
 
 The package divides the cells of a study into batches. Batches are computed in this process or on
-Dask workers. If a worker is lost, its cells are computed again, and an interrupted run can be
-resumed. To decide whether the cells in a journal are still valid, the package compares digests of
-the code and of the declaration (see ``provenance``). The package never imports the command-line
-interface, and never formats output for users.
+Dask workers. If a worker is lost, its cells are computed again. An interrupted run can be resumed.
+To decide whether the cells in a journal are still valid, the package compares digests of the code
+and of the declaration (see ``provenance``). The package never imports the command-line interface,
+and never formats output for users.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class CellTask:
 
     @functools.cached_property
     def output_packer(self) -> OutputPacker:
-        """Converter of the outputs of a cell to a row of the journal."""
+        """Object that converts the outputs of a cell to a row of the journal."""
         return OutputPacker(self.measure)
 
 
@@ -328,9 +328,9 @@ class _CpuTimeLimits:
 
     The operating system measures the CPU time of the whole process. The limit is therefore
     multiplied by the number of computing threads. The limit is set once per batch instead of once
-    per cell. Setting the limit once is sufficient, because a batch stops
-    ``_FINISHED_CELLS_HANDOVER_INTERVAL`` after its start, so only the last cell of a batch can run
-    for a long time.
+    per cell. Setting the limit once is sufficient, because a batch starts no further cells once
+    ``_FINISHED_CELLS_HANDOVER_INTERVAL`` has passed. Only the last cell of a batch can therefore
+    run for a long time.
     """
 
     def __init__(self) -> None:

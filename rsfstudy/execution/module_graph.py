@@ -1,4 +1,4 @@
-"""Import graph and code digests of the modules of rsfstudy.
+"""Import graph and code digests of the rsfstudy modules.
 
 The results of a cell depend on the modules that the measure and the parts of the scene import,
 directly or indirectly. ``ModuleGraph`` finds these modules by reading the source files and computes
@@ -117,12 +117,12 @@ class _Module:
 
     @cached_property
     def imports(self) -> list[tuple[str, list[str]]]:
-        """Modules of the package that this module imports, with the imported names."""
+        """Package modules imported by this module, with the imported names."""
         return _find_imports(self._code)
 
     @cached_property
     def lazy_exports(self) -> Mapping[str, str] | None:
-        """Modules that define the names that this module exports lazily.
+        """Modules from which this module lazily exports names.
 
         Each key is an exported name, and each value is the name of a module. If the module does not
         export names lazily, the value is None.

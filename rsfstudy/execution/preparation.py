@@ -11,7 +11,7 @@ from rsfstudy.study import Study
 
 
 def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool) -> StudyRun:
-    """Prepare the run of a study on workers.
+    """Prepare to run a study on workers.
 
     Parameters
     ----------

@@ -132,7 +132,7 @@ def digest_reachable_modules(measure: Measure, scenes: Iterable[Scene]) -> dict[
 def run_fingerprint(study: Study, scenes: Iterable[Scene]) -> dict[str, Any]:
     """Collect all settings, versions and digests that affect the results.
 
-    The fingerprint does not contain the scene fields and the measure fields, because the keys of
+    The fingerprint contains neither the scene fields nor the measure fields, because the keys of
     the cells are computed from these fields.
 
     Parameters
@@ -197,7 +197,7 @@ def collect_provenance(study: Study, command_line: str, scenes: Iterable[Scene])
 def provenance_attributes(command_line: str) -> dict[str, str]:
     """Build the root attributes that describe the origin of a dataset.
 
-    The function is used for datasets of a single scene.
+    The function is used for datasets that contain a single scene.
 
     Parameters
     ----------

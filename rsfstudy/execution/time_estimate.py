@@ -1,4 +1,4 @@
-"""Estimate of the remaining time of a run, from the times of the first cells."""
+"""Estimate of the remaining time of a run, based on the first finished cells."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ _OPTION_BY_KEYWORD = {"laws": "--law", "steps": "--step"}
 class FitChoices:
     """Choices of the record view.
 
-    An empty text means the default value of ``rsfstudy.read_record`` or ``rsfstudy.fit``.
+    An empty string selects the default value of ``rsfstudy.read_record`` or ``rsfstudy.fit``.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class FitChoices:
         return {name: f"{at:.12g} s" for name, at in limits.items() if at is not None}
 
     def select_window(self, record: Record) -> Record:
-        """Return the part of a record in the window.
+        """Return the portion of a record that lies in the window.
 
         Parameters
         ----------
@@ -173,7 +173,7 @@ class FitChoices:
         return read_record(record, **limits) if limits else record
 
     def find_step(self, steps: Sequence[LoadingStep], time: float) -> int | None:
-        """Return the number of the step at an excluded time.
+        """Return the number of the step at a time that the user has excluded.
 
         Parameters
         ----------

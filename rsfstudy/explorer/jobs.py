@@ -43,7 +43,7 @@ def route_warnings_to_pages() -> None:
 
 @contextmanager
 def collected_warnings() -> Iterator[list[str]]:
-    """Collect the warnings that this thread issues in the body of a ``with`` statement.
+    """Collect the warnings that this thread issues during a ``with`` block.
 
     Yields
     ------
@@ -77,7 +77,7 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """Runner for the computations of a view, in one thread at a time.
+    """Runner that executes the computations of a view in a thread, one at a time.
 
     If a computation is started while another computation is running, the new computation waits. The
     new computation replaces any computation that is already waiting, so at most one computation

@@ -245,18 +245,18 @@ class RecordPlot:
         self.show_fit(None)
 
     def _x(self) -> np.ndarray:
-        """Return the column on the horizontal axis."""
+        """Return the column that is plotted along the horizontal axis."""
         assert self._record is not None
         return self._record.columns[self._x_name]
 
     def _place(self, time: float | None) -> float | None:
-        """Return the horizontal coordinate at a time in s."""
+        """Convert a time in s to a position on the horizontal axis."""
         if time is None or self._record is None:
             return None
         return float(np.interp(time, self._record.time, self._x()))
 
     def _times_between(self, limits: tuple[float, float]) -> tuple[float, float]:
-        """Return the times in s between two horizontal coordinates."""
+        """Return the times in s between two positions on the horizontal axis."""
         assert self._record is not None
         time, ordered = self._record.time, np.maximum.accumulate(self._x())
         first = int(np.searchsorted(ordered, limits[0]))
@@ -291,7 +291,7 @@ class RecordPlot:
         self._fit_curves.data, self._fit_residuals.data = curves, points
 
     def _thin_rows(self, rows: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Thin the rows of a fit in which a variable is not NaN."""
+        """Thin the rows of a fit, without the rows in which a variable is NaN."""
         known = np.isfinite(rows[name])
         x = rows[f"record_{self._x_name}"][known]
         return thin_to_pixels(x, rows[name][known], self._limits, self._pixel_count())
@@ -336,7 +336,7 @@ def _is_selection_tool(tool: Any) -> bool:
 
 
 def _iterate_fitted_rows(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """Yield the curves of each fit of a dataset, with the style of its law."""
+    """Yield the curves of each fit in a dataset, in the line style of its law."""
     laws = dataset["law"].values.tolist()
     with style_context():
         colors = [cycle_style(number)["color"] for number in range(len(laws))]

@@ -240,7 +240,7 @@ class RecordView(View):
     # ---- fit ------------------------------------------------------------------------------------
 
     def _change_choices(self) -> None:
-        """Remove the fit, which is out of date, and update the code."""
+        """Remove the outdated fit, and update the displayed code."""
         self.jobs.cancel()
         self._show_fit(None)
 
@@ -284,7 +284,7 @@ class RecordView(View):
     # ---- code and downloads ---------------------------------------------------------------------
 
     def python_code(self) -> str:
-        """Return Python code that reads the record, fits it and prints the table of the fit."""
+        """Return Python code that reads and fits the record, and prints the fit table."""
         path, lines = self._path, ["import rsfstudy", ""]
         source = json.dumps(path) if path else "record"
         if not path:

@@ -1,4 +1,4 @@
-"""Data of the curves and maps of a selection of results.
+"""Data for the curves and maps that show a selection of results.
 
 The functions return arrays, and never draw a plot.
 """
@@ -93,7 +93,7 @@ def error_name(dataset: xr.Dataset, variable: str) -> str:
 
 
 def part_names(dataset: xr.Dataset, selection: Selection) -> list[str]:
-    """Return the names of the variables that a selection shows.
+    """Return the names of the variables displayed by a selection.
 
     The list contains the plotted variable, its error estimate, the variable on the x axis, the
     status and the message.
@@ -105,14 +105,14 @@ def part_names(dataset: xr.Dataset, selection: Selection) -> list[str]:
 
 
 def shows_cells(dataset: xr.Dataset, variable: str) -> bool:
-    """Return True if each value of a variable belongs to one cell."""
+    """Return True if a variable has exactly one value per cell."""
     return {*dataset["status"].dims} <= {*dataset[variable].dims}
 
 
 def iterate_panels(dataset: xr.Dataset, selection: Selection) -> Iterator[Selection]:
-    """Yield one selection without a facet for each panel.
+    """Yield one selection per panel, with a fixed point of the facet dimension.
 
-    At most 12 points of the facet dimension are selected, at regular intervals.
+    At most 12 evenly spaced points of the facet dimension are used.
     """
     if not selection.facet:
         yield selection
@@ -130,7 +130,7 @@ def thin_points(size: int, most: int) -> np.ndarray:
 
 
 def describe_points(dataset: xr.Dataset, points: Mapping[str, int]) -> str:
-    """Describe the selected points of several dimensions in mathtext."""
+    """Describe the selected points of several dimensions as a mathtext label."""
     varied = [d for d in points if dataset.sizes[d] > 1]
     return ", ".join(
         describe_point(dataset.coords.to_dataset().isel({d: points[d]}), d) for d in varied
@@ -140,7 +140,7 @@ def describe_points(dataset: xr.Dataset, points: Mapping[str, int]) -> str:
 def _arrays_of_panel(
     dataset: xr.Dataset, panel: Selection, dimensions: Sequence[str]
 ) -> tuple[np.ndarray, ...]:
-    """Return values, errors, statuses and cell numbers along the dimensions of a panel."""
+    """Return the values, errors, statuses and cell numbers shown in a panel."""
     lattice, error = dataset["status"], error_name(dataset, panel.variable)
     status, cells = xr.DataArray(int(Status.OK)), xr.DataArray(-1)
     if shows_cells(dataset, panel.variable):
@@ -165,11 +165,11 @@ def _arrays_of_panel(
 
 
 def curves_of_panel(dataset: xr.Dataset, panel: Selection) -> list[Curve]:
-    """Return the curves of a panel without a facet.
+    """Return the curves of a single panel.
 
-    If there are more than 40 curves, curves at regular intervals are returned. A curve with more
-    than 4,000 points is thinned: of each group of neighbouring points, the lowest point, the
-    highest point and the first failed cell are kept.
+    If a panel has more than 40 curves, only a regularly spaced subset of the curves is returned. A
+    curve with more than 4,000 points is thinned: of each group of neighbouring points, the lowest
+    point, the highest point and the first failed cell are kept.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def _x_values(
 
 
 def thin_curve(values: np.ndarray, status: np.ndarray | None = None) -> np.ndarray:
-    """Return the indices of the points of a curve that are drawn.
+    """Return the indices of the curve points that are drawn.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def thin_curve(values: np.ndarray, status: np.ndarray | None = None) -> np.ndarr
 
 
 def map_of_panel(dataset: xr.Dataset, panel: Selection) -> Map:
-    """Return the map of a panel without a facet.
+    """Return the map of a single panel.
 
     Parameters
     ----------

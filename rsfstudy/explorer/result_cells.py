@@ -126,7 +126,7 @@ def recompute(
 def _recorded_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[xr.Dataset | None, str, str]:
-    """Return the motion that a measure has recorded, with an explanation and code."""
+    """Return the motion recorded by a measure, with an explanation and its code."""
     dims = measure.variables.get("log10_slip_rate", ())
     names = [n for n in outcome.values if measure.variables[n] == dims]
     if len(dims) != 1 or not {*_ABSCISSAE} & {*names}:
@@ -141,7 +141,7 @@ def _recorded_motion(
 def _loading_of_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[dict[str, tuple[float, str]], str]:
-    """Return the fields of the loading with their code, and an explanation."""
+    """Return the loading fields of a motion, their Python code, and an explanation."""
     loads = [name for name in measure.solved_fields if name in _LOAD_WITHOUT_VALUE]
     if loads:
         verified = f"{measure.primary_output}_unstable"
@@ -165,7 +165,7 @@ def _loading_of_motion(
 
 
 def tabulate_outcome(cell: RecomputedCell, results: xr.Dataset) -> pd.DataFrame:
-    """Return a table of the numbers of a cell, with errors and with the stored values.
+    """Return a table of the recomputed numbers, their errors and the stored values.
 
     Parameters
     ----------

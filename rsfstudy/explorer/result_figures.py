@@ -173,7 +173,7 @@ class Plot(ABC):
 
 
 def _mark_columns(symbols: dict[int, str], marks: Marks, x: Any, y: Any) -> dict[str, Any]:
-    """Return the columns of the source of the status symbols."""
+    """Return the data source columns of the status symbols."""
     failed = marks.status >= int(Status.WORK_BUDGET_SPENT)
     codes = marks.status.tolist()
     return {
@@ -257,7 +257,7 @@ class CurvesPlot(Plot):
 def _curve_styles(
     dataset: xr.Dataset, panel: Selection, curves: Sequence[Curve]
 ) -> list[dict[str, Any]]:
-    """Return colour, dashes, opacity of the line, marker and marker size of each curve."""
+    """Return the colour, dashes, opacity, marker and marker size of each curve."""
     with style_context():
         cycled = [cycle_style(c.number) for c in curves]
     colours, dashes = [s["color"] for s in cycled], [s["linestyle"] for s in cycled]
@@ -287,7 +287,7 @@ def _is_monotonic(values: np.ndarray) -> bool:
 
 
 def _point_columns(curves: Sequence[Curve], styles: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the columns of the source of the points and error bars."""
+    """Return the data source columns of the points and error bars."""
     total = sum(c.x.size for c in curves)
     each = total if total <= _MAX_SELECTABLE_POINTS else _MAX_SELECTABLE_POINTS // len(curves)
     kept = [thin_points(c.x.size, each) for c in curves]
@@ -368,7 +368,7 @@ class MapPlot(Plot):
 
 
 def _image_of_map(found: Map) -> tuple[np.ndarray, list[tuple[float, float]]]:
-    """Return the image of a map, and its limits along x and y.
+    """Return the image of a map, and the limits of the image along x and y.
 
     If all cells have the same size on the axes, each pixel of the image is one cell.
     """

@@ -76,7 +76,7 @@ def plotted_variables(dataset: xr.Dataset) -> list[str]:
 
 
 def list_x_choices(dataset: xr.Dataset, variable: str) -> list[str]:
-    """Return the names of the dimensions, coordinates and variables that can be along x.
+    """Return the names of all quantities that can be plotted along x.
 
     Besides the dimensions of the variable, the list contains the numeric coordinates along one of
     these dimensions. If the variable was recorded inside each cell, for example along an orbit, the
@@ -99,12 +99,12 @@ def list_x_choices(dataset: xr.Dataset, variable: str) -> list[str]:
 
 
 def _inner_dimensions(dataset: xr.Dataset, variable: str) -> list[str]:
-    """Return the dimensions of a variable that are not dimensions of the lattice."""
+    """Return the dimensions of a variable that do not belong to the lattice."""
     return [str(d) for d in dataset[variable].dims if d not in dataset["status"].dims]
 
 
 def dimension_along_x(dataset: xr.Dataset, variable: str, x: str) -> str:
-    """Return the dimension of the points along x."""
+    """Return the dimension that is plotted along x."""
     if x in dataset[variable].dims:
         return x
     inner = _inner_dimensions(dataset, variable)
@@ -191,7 +191,7 @@ def _check_choice(what: str, value: Any, choices: Sequence[str]) -> Any:
 
 
 def _default_x(dataset: xr.Dataset, variable: str, choices: Sequence[str]) -> str:
-    """Return the last dimension of the outputs, or else the longest dimension."""
+    """Return the last dimension inside the cells, or else the longest dimension."""
     if inner := [d for d in _inner_dimensions(dataset, variable) if d in choices]:
         return inner[-1]
     return max(reversed(choices), key=lambda name: dataset[name].size)

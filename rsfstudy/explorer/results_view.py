@@ -60,7 +60,7 @@ _KINDS = {"Lines": LINES, "Map": MAP}
 
 
 class ResultsView(View):
-    """View of the results of a study, with a plot, the declared figure and single cells.
+    """View of study results: a plot, the figure declared by the study, and cells.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class ResultsView(View):
         return [*self._choices.values(), self._slider_column, cell]
 
     def plots(self) -> list[Any]:
-        """Return the tabs with the plot and with the declared figure."""
+        """Return the tabs that show the plot and the figure declared by the study."""
         return [self._tabs]
 
     def status(self) -> list[Any]:
@@ -149,7 +149,7 @@ class ResultsView(View):
         return tables
 
     def _update_widgets(self) -> None:
-        """Set the options and values of all widgets to the selection."""
+        """Update the options and values of all widgets to match the selection."""
         shown, selection = self.shown, self.selection
         plane = list_map_dimensions(shown, selection.variable)
         is_map = selection.kind == MAP
@@ -211,7 +211,10 @@ class ResultsView(View):
         return complete_selection(self.shown, **wishes, points=points)
 
     def _select(self, selection: Selection) -> None:
-        """Show another selection. If only points differ, the figures are kept."""
+        """Show another selection.
+
+        If the selections differ only in their points, the existing figures are updated.
+        """
         old, self.selection = self.selection, selection
         self.hide_error()
         self._update_widgets()
@@ -235,7 +238,7 @@ class ResultsView(View):
         self._plot_area[:] = [pn.pane.Bokeh(plot.figure, **_WIDE) for plot in self._plots]
 
     def _on_tab(self, event: Any) -> None:
-        """Draw the declared figure when its tab is opened for the first time."""
+        """Draw the figure declared by the study when its tab is first opened."""
         if event.new == 1 and not len(self._figure_area):
             self.jobs.start(
                 lambda _report: render_figure(draw_figure(self.results), "png"),
@@ -362,7 +365,7 @@ class ResultsView(View):
 
 
 def _show_text(text: str, weight: str = "normal") -> pn.pane.HTML:
-    """Return a pane that shows a text with line breaks where necessary."""
+    """Return a pane that displays text and wraps long lines."""
     return pn.pane.HTML(html.escape(text), styles={"font-weight": weight}, **_WIDE)
 
 

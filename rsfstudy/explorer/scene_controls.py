@@ -83,7 +83,7 @@ class SceneControls:
         self.show(settings)
 
     def show(self, settings: SceneSettings) -> None:
-        """Create the widgets again, for other settings.
+        """Recreate the widgets after the settings have changed.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class SceneControls:
         return f"{value * scale_in_units(self._rig, scale):.4g} {UNITS_BY_SCALE[scale]}"
 
     def _choose_units(self, units: str) -> None:
-        """Express the scene in the units of a rig, or without units."""
+        """Express the scene in rig units or in dimensionless form."""
         scene = self.settings.build_scene(self._rig)
         rig = None if units == "dimensionless" else Rig(**README_RIG)
         self.show(SceneSettings.from_scene(scene, rig))
@@ -178,7 +178,7 @@ class SceneControls:
     # ---- widgets --------------------------------------------------------------------------------
 
     def _card(self, title: str, widgets: list[Any], collapsed: bool | None = None) -> pn.Card:
-        """Return a card, which is collapsed if it contains nothing but a selector."""
+        """Return a card, which is collapsed if a selector is its only content."""
         is_collapsed = len(widgets) == 1 if collapsed is None else collapsed
         return pn.Card(
             *widgets, title=title.replace("_", " ").capitalize(), collapsed=is_collapsed, width=285,
@@ -209,7 +209,7 @@ class SceneControls:
         ]
 
     def _fields_of_rig(self) -> set[str]:
-        """Return the fields that have no widget because the rig or a menu sets them."""
+        """Return the fields that the rig or a menu sets, and that need no widget."""
         if self._rig is None:
             return {"inertia"}
         return _FIELDS_OF_RIG - (set() if "stiffness" in self.settings.rig else _STIFFNESS)

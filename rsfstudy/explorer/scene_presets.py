@@ -1,4 +1,4 @@
-"""Presets of the scene view: figures of the paper, and the rigs of the README."""
+"""Presets of the scene view, taken from the figures of the paper and the README."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ class SceneSettings:
         return {name: value for name, value in asdict(self).items() if value}
 
     def with_field(self, name: str, value: Any) -> Self:
-        """Return settings with a changed field, or without it if the value is None."""
+        """Return settings in which a field is changed, or removed if the value is None."""
         changed = {n: v for n, v in self.scene.items() if n != name}
         return replace(self, scene=changed if value is None else changed | {name: value})
 
@@ -298,14 +298,14 @@ def format_protocol(segments: Any) -> str:
 
 
 def rig_name(field_name: str) -> str:
-    """Return the name of a field in units of a rig, such as ``load_velocity``."""
+    """Return the name of a field in rig units, such as ``load_velocity``."""
     quantity = QUANTITY_BY_FIELD.get(field_name)
     is_velocity = quantity is not None and quantity.scale == "V_*" and "_ratio" in field_name
     return field_name.removesuffix("_ratio") if is_velocity else field_name
 
 
 def with_rig_units(rig: Rig, field_name: str, value: Any) -> Any:
-    """Convert the value of a field to a text with units of a rig.
+    """Format the value of a field with rig units.
 
     Parameters
     ----------
@@ -329,7 +329,7 @@ def with_rig_units(rig: Rig, field_name: str, value: Any) -> Any:
 
 
 def scale_in_units(rig: Rig, scale: str) -> float:
-    """Return a scale of a rig in the units that the page shows."""
+    """Return a rig scale in the units shown on the page."""
     return float(rig.scales[scale].factor) / _SI_VALUES[UNITS_BY_SCALE[scale]]
 
 
@@ -339,7 +339,7 @@ def _find_user_parts() -> dict[str, Any]:
 
 
 def _fields_of_rig(rig: Rig) -> set[str]:
-    """Return the names of the fields that follow from the quantities of a rig."""
+    """Return the names of the fields that are computed from rig quantities."""
     plain = Scene().as_dict()
     of_rig = rig.scene(normal_stress=plain["normal_stress"]).as_dict()
     derived = {name for name, value in of_rig.items() if value not in (None, plain.get(name))}

@@ -42,7 +42,7 @@ _GRID_STYLE = {
 
 
 class Result(NamedTuple):
-    """Motion of a scene and the texts about it.
+    """Motion of a scene, with the sentences that describe it.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Result(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Sentences about the stability of steady sliding and about the end of the motion."""
+        """Sentences about the stability of steady sliding and the end of the motion."""
         sentences = [text for text in self.summary if isinstance(text, str)]
         status, message = self.motion.attrs["status"], self.motion.attrs["message"]
         ending = "" if status == "ok" else f" Motion: {status}. {message}"
@@ -125,7 +125,7 @@ class Result(NamedTuple):
         }
 
     def steady_line(self) -> dict[str, np.ndarray]:
-        """Return the friction of steady sliding over the slip rates of the motion.
+        """Return steady-state friction over the slip rate range of the motion.
 
         Returns
         -------
@@ -274,7 +274,7 @@ class SceneView(View):
         self.jobs.start(compute, self._show_result, self._show_failure, label="Computing")
 
     def _show_failure(self, error: Exception) -> None:
-        """Show an error, and remove the curves that do not belong to the settings."""
+        """Show an error, and remove the curves that no longer match the settings."""
         self._result = None
         self._verdict.object = self._peaks.object = ""
         for source in (self._motion_source, self._start_source, self._steady_source):

@@ -34,7 +34,7 @@ _TOKEN_ARGUMENT = "token"
 
 
 class ExplorerServer:
-    """Web server with one page, which shows a view of a source.
+    """Web server of a single page, which displays the view of a source.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ setTimeout(() => { button.label = "Copy" }, 1500)
 
 
 class View(ABC):
-    """Base class of a view, which adds code, downloads and messages to widgets and plots.
+    """Base class that adds code, downloads and messages to the widgets of a view.
 
     A subclass creates its widgets in ``__init__``, and implements the abstract methods. The
     subclass calls ``refresh`` after each change to its widgets. To handle errors of computations,
@@ -62,7 +62,7 @@ class View(ABC):
     file_stem = "rsfstudy"
 
     def __init__(self, source: Any) -> None:
-        """Create the parts of the page that all views have."""
+        """Create the parts of the page that all views share."""
         self.source = source
         self.jobs = Jobs(self.show_warnings)
         self._alert = pn.pane.Alert("", alert_type="danger", visible=False)
@@ -278,7 +278,7 @@ class View(ABC):
 
     @contextmanager
     def errors_shown(self) -> Iterator[None]:
-        """Show the message of an error that is raised in the body of a ``with`` statement.
+        """Show the message of any error that is raised inside a ``with`` block.
 
         Yields
         ------

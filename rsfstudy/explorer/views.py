@@ -1,4 +1,4 @@
-"""Choice of the view of a scene, a dataset or a file.
+"""Selection of the view that displays a scene, a dataset or a file.
 
 The main function is ``create_view``.
 """
@@ -52,7 +52,7 @@ def create_view(source: Any = None, state: str | None = None) -> View:
 
 
 def _find_kind(source: Any) -> tuple[str, Any]:
-    """Return the kind of a view and the object that the view shows.
+    """Return the type of view to create and the object to display.
 
     If the source is a results file, the function opens the file. If the source is the file of a
     record, the function does not read the file, because the record view reads it with options that

@@ -1,8 +1,8 @@
 """Base class of measures, and functions that several measures share.
 
 A ``Measure`` computes named results of one scene, with a status, error estimates and the cost of
-the computation. The base class checks the results. The package never contains measures of critical
-steps, limit cycles, responses or fits. These measures are in separate packages. The module
+the computation. The base class checks the results. The package never defines measures of critical
+steps, limit cycles, responses or fits, because these measures are in separate packages. The module
 ``rsfstudy.measures`` exports all measures.
 """
 

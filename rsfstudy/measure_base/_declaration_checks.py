@@ -156,7 +156,7 @@ def check_output_value(
 def check_field_value(
     field_name: str, value: Any, current_value: PlainValue, must_be_integer: bool
 ) -> Any:
-    """Check a new value of a field of a measure.
+    """Check a new value for a measure field.
 
     Parameters
     ----------

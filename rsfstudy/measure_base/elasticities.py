@@ -339,7 +339,7 @@ class Elasticities(Measure):
         log_change: float,
         integrator: Integrator,
     ) -> _LogValueWithError | None:
-        """Compute ``ln|y|`` after a change of ln p.
+        """Compute ``ln|y|`` after the logarithm of a parameter has been changed.
 
         Parameters
         ----------

@@ -4,10 +4,10 @@ A measure computes named results of one scene. Each result has a unit, and may h
 estimate. The class ``Measure`` runs the computation, checks the results, and counts the
 right-hand-side evaluations. To define a measure, derive a frozen dataclass from ``Measure``.
 
-Instances of measures are picklable, so Dask can send them to its workers. A measure also converts
-itself to plain data, so that a NetCDF file can store the definition of the measure. Fields that
-hold a number, a flag or a string may vary along an axis, in the same way as the fields of a scene.
-A field must not vary along an axis if the names of the results depend on the field.
+Instances of measures are picklable, so Dask can send them to its workers. A measure can also be
+converted to plain data, so that a NetCDF file can store its definition. Fields that hold a number,
+a flag or a string may vary along an axis, in the same way as the fields of a scene. A field must
+not vary along an axis if the names of the results depend on the field.
 """
 
 from __future__ import annotations
@@ -100,12 +100,12 @@ class Measure(ConstructorKeywordCheckMixin):
     number for each name in ``outputs``. For each output with ``error=True``, the mapping also
     contains an error estimate with the name ``<name>_error``.
 
-    The argument ``integrator`` is an ``rsfstudy.Integrator``. It contains the requested relative
-    accuracy, ``integrator.rtol``, counts right-hand-side evaluations, and stops a motion that
-    exceeds the work budget. To compute a motion, pass the integrator to ``rsfstudy.simulate``:
+    The argument ``integrator`` is an ``rsfstudy.Integrator``. The integrator stores the requested
+    relative accuracy as ``integrator.rtol``, counts right-hand-side evaluations, and stops a motion
+    that exceeds the work budget. To compute a motion, pass the integrator to ``rsfstudy.simulate``:
     ``rsfstudy.simulate(scene, integrator=integrator)``. The functions ``rsfstudy.critical_step``
-    and ``rsfstudy.limit_cycle`` also take ``integrator=integrator``. To use the outcome of another
-    measure, call the ``run_nested`` method of that measure. To estimate errors, repeat the
+    and ``rsfstudy.limit_cycle`` also accept the argument ``integrator``. To use the outcome of
+    another measure, call the ``run_nested`` method of that measure. To estimate errors, repeat the
     computation with ``integrator.refined()``, whose tolerances are ten times smaller.
 
     Override ``error_scales`` to set the status to ``unverified`` if the error estimates are far too
@@ -296,9 +296,9 @@ class Measure(ConstructorKeywordCheckMixin):
 
         The requested error of each result is the relative accuracy multiplied by the scale of the
         result. If the error estimate of a result is more than a hundred times the requested error,
-        the status of the cell becomes ``unverified``. Results without a scale are not checked. An
-        override should omit statistical results, and results whose resolution is an option of the
-        measure.
+        the status of the cell becomes ``unverified``. Results without a scale are not checked. A
+        method that overrides this one should omit statistical results, and results whose resolution
+        is set by an option of the measure.
 
         Parameters
         ----------
@@ -524,7 +524,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Create the field values that are not plain data from a description.
+        """Rebuild the fields that are not plain data from a measure description.
 
         Parameters
         ----------
@@ -598,7 +598,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
 
 
 def relative_work_at_accuracy(accuracy: Accuracy, work_by_digits: Mapping[float, float]) -> float:
-    """Return the cost of an accuracy relative to the cost of the default accuracy.
+    """Return the cost at a requested accuracy, relative to the default accuracy.
 
     The function interpolates costs that were measured for several numbers of digits.
 

@@ -112,7 +112,7 @@ class AnswerComparison:
 
     @property
     def agreeing_digits(self) -> float:
-        """Smallest number of correct digits of all quantities."""
+        """Smallest number of correct digits among all quantities."""
         return min(agreement.agreeing_digits for agreement in self.quantity_agreements)
 
     @property

@@ -330,7 +330,7 @@ class BenchmarkProblem:
 
     @property
     def initial_event(self) -> Event | None:
-        """Initial state of the motion with the initial slip rate and theta.
+        """Initial state of the motion, computed from the initial slip rate and theta.
 
         The stress of the spring is chosen so that the slip rate before the first step of the
         loading is the initial slip rate. The property is None if the problem has no initial values.
@@ -460,7 +460,7 @@ def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
 
 
 def shipped_problem_files() -> dict[int, Path]:
-    """Return the files of the shipped problems by number.
+    """Return the files of the shipped problems, keyed by problem number.
 
     Returns
     -------

@@ -53,7 +53,7 @@ def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColum
 
 
 def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
-    """Compute the effective normal stress at the times of a series.
+    """Compute the effective normal stress at the times of a time series.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
 
 
 def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColumnByQuantity:
-    r"""Compute the values of a series at the times of the problem.
+    r"""Compute a time series at the times that the problem specifies.
 
     The state variables :math:`\Theta` of the simulated motion are converted to :math:`\theta =
     \theta_* e^{\Theta/b}`. Before the conversion, the effect of normal stress on the state is
-    subtracted from the state variables. The effect is distributed to the state variables in
+    subtracted from the state variables. The effect is distributed among the state variables in
     proportion to :math:`|b|`.
     """
     scene, rig = problem.scene, problem.rig

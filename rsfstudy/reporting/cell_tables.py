@@ -1,4 +1,4 @@
-"""Tables of the cells of a study, and number of cells with each status."""
+"""Tables of study cells, and counts of cells by status."""
 
 from __future__ import annotations
 

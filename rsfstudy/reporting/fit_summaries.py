@@ -104,7 +104,7 @@ def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
 
 
 def _summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
-    """Return the row of a fit in the table with one row per fit."""
+    """Return the row that represents a fit in the summary table."""
     few = {
         n: format_with_stderr(fit, name)
         for name, n in parameter_headings(fit).items()
@@ -172,7 +172,7 @@ def _describe_window(fit: xr.Dataset) -> str:
 
 
 def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
-    """Format a fitted parameter with its standard error.
+    """Format the value of a fitted parameter with its standard error.
 
     The value and the error are rounded to two significant digits of the error.
 

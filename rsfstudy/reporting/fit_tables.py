@@ -122,7 +122,7 @@ def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
 
 
 def scene_fields_set_by_fit(dataset: xr.Dataset) -> set[str]:
-    """Return the names of the scene fields that follow from a fit or from its record.
+    """Return the names of the scene fields determined by a fit or by its record.
 
     The declaration of a fit contains only the initial values of these fields.
 

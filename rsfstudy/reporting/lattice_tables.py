@@ -94,8 +94,8 @@ def select_thinned_points(
 ) -> dict[str, np.ndarray]:
     """Select points of each dimension so that the number of cells is limited.
 
-    The first and the last point of a dimension are selected if at least two points of the dimension
-    are selected.
+    Along each dimension with at least two selected points, the selection includes the first and the
+    last point.
 
     Parameters
     ----------

@@ -128,7 +128,7 @@ def _select_applicable_fields(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _list_results(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return name, description and dimensions of each result in a dataset."""
+    """Return the name, description and dimensions of each result in a dataset."""
     return [
         {
             "name": str(name),  # Users may add variables without the attribute ``long_name``.

@@ -182,7 +182,7 @@ def format_missing_results(dataset: xr.Dataset, reasons: Mapping[str, str]) -> d
 
 
 def _format_point(values: xr.DataArray, indices: Sequence[int]) -> str:
-    """Format the coordinates of a value on the dimensions of an array."""
+    """Format the coordinates that locate a value in an array."""
     point = values.isel(dict(zip(values.dims, indices, strict=True)))
     return ", ".join(f"{d} = {format_value(point[d].item())}" for d in values.dims)
 

@@ -47,7 +47,7 @@ class TextTable:
 
 
 class Column(NamedTuple):
-    """Column of a table that shows a variable of a dataset.
+    """Table column that shows a variable of a dataset.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def format_rounded_to_error(value: float, error: float) -> str:
 
 
 def build_single_scene_result_table(dataset: xr.Dataset) -> TextTable:
-    """Build a table of the scalar variables of a dataset of one scene.
+    """Build a table of the scalar variables in a single-scene dataset.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def build_table_along_dimensions(
     caption: str = "",
     wrappable_columns: Collection[str] = (),
 ) -> TextTable:
-    """Build a table with one row for each combination of points on dimensions.
+    """Build a table with one row for each combination of coordinate values.
 
     Parameters
     ----------

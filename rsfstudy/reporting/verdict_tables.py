@@ -1,4 +1,4 @@
-"""Tables of claims and verdicts, and number of claims with each verdict."""
+"""Tables of claims and their verdicts, and counts of claims by verdict."""
 
 from __future__ import annotations
 

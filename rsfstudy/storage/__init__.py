@@ -1,9 +1,10 @@
 """Storage of results: journals, results files and their schema.
 
 The package also compares results and rebuilds studies. A results file is either written completely
-or not written. When a results file is read, its contents are checked. A study can be rebuilt from
-the declaration in its results file. To add a format of results files, add a module to this package.
-To add an export format, see ``rsfstudy.cli.export_files``. The package never computes cells.
+or not written at all. When a results file is read, its contents are checked. A study can be rebuilt
+from the declaration in its results file. To add a format of results files, add a module to this
+package. To add an export format, see ``rsfstudy.cli.export_files``. The package never computes
+cells.
 """
 
 from __future__ import annotations

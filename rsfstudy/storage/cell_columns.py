@@ -1,4 +1,4 @@
-"""Conversion of finished cells to rows of a journal and to columns.
+"""Conversion of finished cells to journal rows and to column arrays.
 
 The class ``OutputPacker`` converts the outcome of a cell to a row of the journal. ``CellColumns``
 contains arrays with the results of many cells. Datasets are assembled from these arrays.

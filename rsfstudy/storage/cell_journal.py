@@ -4,10 +4,10 @@ The journal is an SQLite file in the directory of the results. Cells are stored 
 finished, so that an interrupted run can be resumed. Only one run at a time can use a journal.
 
 The key of a cell is a digest of the exact values of the scene fields and the measure fields. The
-fingerprint of a journal contains all other settings that affect the results. If the fingerprint of
-the journal differs from the fingerprint of the run, the run rejects the journal (see
-``fingerprints``). As an exception, the work budget in the fingerprint of the run may be larger than
-the work budget in the fingerprint of the journal.
+fingerprint of a journal contains all settings that affect the results, except the fields in the
+cell keys. If the fingerprint of the journal differs from the fingerprint of the run, the run
+rejects the journal (see ``fingerprints``). As an exception, the run may have a larger work budget
+than the journal.
 """
 
 from __future__ import annotations
@@ -145,10 +145,10 @@ class CellJournal:
         """Check that the stored fingerprint is compatible with the fingerprint of a run.
 
         The code digests must be equal only for the modules that both fingerprints contain, because
-        the results in the journal do not depend on the other modules. The work budget of the run
-        may also be larger, because the result of a finished cell does not depend on the budget. In
-        these two cases, the method stores the merged fingerprint. For any other difference, the
-        method raises ``DataError``.
+        the results in the journal do not depend on the other modules. The run may also have a
+        larger work budget than the journal, because the result of a finished cell does not depend
+        on the budget. If the fingerprints differ only in these two ways, the method stores the
+        merged fingerprint. For any other difference, the method raises ``DataError``.
         """
         try:
             stored = dict(json.loads(stored_fingerprint))

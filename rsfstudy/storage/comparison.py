@@ -179,7 +179,7 @@ class Comparison:
 
     @property
     def beyond_errors(self) -> list[str]:
-        """Names of variables that differ by more than the sum of both error estimates."""
+        """Names of variables whose difference exceeds the sum of both error estimates."""
         return list(self.agreement_table["variable"][self.agreement_table["beyond_errors"] > 0])
 
     @property
@@ -332,10 +332,10 @@ def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, s
 
 
 def _compare_numbers_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
-    """Compare the numeric variables in the cells that both datasets have.
+    """Compare the numeric variables in the cells that both datasets share.
 
-    If the primary output has no error estimates, every pair of different values of the primary
-    output is counted in ``beyond_errors``.
+    If the primary output has no error estimates, each of its values that differs is counted in
+    ``beyond_errors``.
     """
     frame = compare_same_lattice(*shared_cells)
     about = find_primary_output(shared_cells[0])
@@ -377,7 +377,7 @@ def _flatten_declaration(declaration_part: Any, path: str = "") -> Iterator[tupl
 
 
 def _read_versions_and_machine(dataset: xr.Dataset) -> dict[str, Any]:
-    """Read the versions, code digests and machine of a dataset."""
+    """Read the versions, code digests and machine description from a dataset."""
     about: Mapping[str, Any] = read_provenance(dataset)
     decided = {
         n: v

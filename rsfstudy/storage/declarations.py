@@ -1,4 +1,4 @@
-"""Schema of the declarations of studies in results files.
+"""Schema of the study declarations in results files.
 
 The structs define the format of a declaration in a results file. The functions build studies,
 scenes, measures and reductions from the structs. A missing entry is never replaced by a default
@@ -107,13 +107,13 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _StoredMeasure(msgspec.Struct):
-    """Entries that the declaration of every measure has."""
+    """Entries required in every measure declaration."""
 
     name: str
 
 
 class _StoredReduction(msgspec.Struct):
-    """Entries that the declaration of every reduction has."""
+    """Entries required in every reduction declaration."""
 
     kind: str
     name: str
@@ -360,10 +360,11 @@ def build_reduction(plain_reduction: Mapping[str, Any], path_in_file: str) -> Re
 def _find_class(
     declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
 ) -> Any:
-    """Look up an rsfstudy class by the name that declarations use for the class.
+    """Look up an rsfstudy class by its name in study declarations.
 
-    The function first searches the package that exports all classes of this kind. If there is no
-    class with this name, the function also searches the modules of the named studies.
+    The function first searches the package that exports the measures or the reductions. If the
+    package has no class with this name, the function also searches the modules of the named
+    studies.
     """
     for exported in exporting_package.__all__:
         getattr(exporting_package, exported)  # The attribute access loads the module of the class.
@@ -380,7 +381,7 @@ def _find_class(
 
 
 def _named_subclasses(base_class: Any) -> dict[str, Any]:
-    """Return the concrete subclasses in rsfstudy, by the name used in files."""
+    """Return the concrete subclasses in rsfstudy, keyed by their names in files."""
     found: dict[str, Any] = {}
     for kind in base_class.__subclasses__():
         found |= _named_subclasses(kind)

@@ -1,11 +1,11 @@
 """Comparison and merging of fingerprints.
 
-A fingerprint contains the settings and the code digests that affect results. The entry ``physics``
-contains one code digest for each module of rsfstudy that the measure and the parts of the scenes
-import directly or indirectly. Two fingerprints may contain different modules. For example, the
-fingerprint of a study with more laws contains the modules of these laws. The code of two
-fingerprints agrees if all modules that occur in both fingerprints have the same digests in both.
-Older fingerprints contain one digest of all modules.
+A fingerprint contains the settings and the code digests that affect results. The ``physics`` entry
+contains one code digest for each rsfstudy module that is imported, directly or indirectly, by the
+measure or by the parts of the scenes. Two fingerprints may contain different modules. For example,
+if a study uses additional laws, its fingerprint also contains the modules of these laws. Two
+fingerprints have matching code if every module they share has the same digest. Older fingerprints
+contain one digest of all modules.
 """
 
 from __future__ import annotations

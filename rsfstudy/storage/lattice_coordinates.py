@@ -48,7 +48,7 @@ def _dimension_values(axis: Axis) -> np.ndarray:
 
 
 class LatticeCoordinates:
-    """Builder of the coordinates of a lattice from the scenes of a few cells.
+    """Builder that derives the lattice coordinates from the scenes of a few cells.
 
     The coordinates include the dimension coordinates and the scene fields. A field that varies
     along an axis has the dimension of this axis, and a fixed field is a scalar. The coordinates
@@ -119,7 +119,7 @@ class LatticeCoordinates:
 def _coordinates_of_axis(
     study: Study, axis: Axis, fields_of_points: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Build the dimension coordinate of an axis, and the fields along the axis."""
+    """Build the dimension coordinate of an axis, and the coordinates of its fields."""
     coords: dict[str, Any] = {}
     if axis.labels is not None or axis.has_numbered_points:
         words = axis.dimension.replace("_", " ")

@@ -74,7 +74,7 @@ def assemble_dataset(
 def build_lattice_variables(
     study: Study, cell_columns: CellColumns, block_shape: tuple[int, ...]
 ) -> dict[Any, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
-    """Build the variables of a block of cells.
+    """Build the dataset variables for a block of cells.
 
     The variables include all outputs of the measure. The variables also include the status, the
     message, the wall time and the number of right-hand-side evaluations of each cell.

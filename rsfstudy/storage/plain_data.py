@@ -168,7 +168,7 @@ def convert_fields(
 
 
 def call_with_fields(constructor: Any, values: Mapping[str, Any], path_in_file: str) -> Any:
-    """Call a constructor, and add the path in the file to its error messages.
+    """Call a constructor, and add the location in the file to its error messages.
 
     Parameters
     ----------

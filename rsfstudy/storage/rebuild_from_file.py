@@ -223,7 +223,7 @@ def study_from_declaration(
 
 
 def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
-    """Return the user-defined parts of a study and of its files."""
+    """Return the user-defined parts of a study and all other registered parts."""
     others = {name: part for slot in SceneFields.SLOTS for name, part in slot.user_parts.items()}
     return {} if study is None else {**others, **study.user_parts}
 

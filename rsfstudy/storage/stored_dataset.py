@@ -47,12 +47,12 @@ class StoredDataset:
 
     @property
     def scene_fields(self) -> dict[str, Any]:
-        """Fields of the scene of a dataset of a single scene."""
+        """Scene fields, if the dataset belongs to a single scene."""
         return schema.read_scene_fields(self.dataset)
 
     @property
     def study(self) -> Study:
-        """Study with all cells, even if only some cells of the dataset are selected."""
+        """Complete study, even if the dataset contains only a selection of its cells."""
         return rebuild_from_file.study_of_dataset(self.dataset)
 
     @property

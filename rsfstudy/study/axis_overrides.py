@@ -13,7 +13,7 @@ from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 
 
 def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
-    """Select points of a zipped axis by label or of a numbered axis by number.
+    """Select axis points by label (zipped axes) or by number (numbered axes).
 
     Parameters
     ----------
@@ -127,8 +127,8 @@ def _relabel_overridden_point(
 
     If the label contains the old value, as in ``"imposed, alpha = 0.25"``, the new value replaces
     the old value in the label. If the label does not contain the old value, but the new value
-    identifies the point (``value_identifies_point``), the label becomes ``"alpha = 0.3"``. In all
-    other cases ``"alpha = 0.3"`` is appended to the label.
+    identifies the point (``value_identifies_point``), the label is replaced by the new value, as in
+    ``"alpha = 0.3"``. In all other cases, text such as ``"alpha = 0.3"`` is appended to the label.
     """
     text = f"{field_name} = {_format_with_all_digits(new_value)}"
     old_text = re.escape(_format_with_all_digits(old_value))

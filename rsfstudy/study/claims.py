@@ -264,7 +264,7 @@ class Claim:
 
 
 def _note_on_large_error(dataset: xr.Dataset, claim: Claim) -> str:
-    """Return a note if the error estimate of a result exceeds the tolerance of an equality."""
+    """Return a note if the error estimate exceeds the tolerance of an equality claim."""
     values = [(claim.variable, claim.where)]
     if claim.baseline:
         values.append((claim.baseline_variable or claim.variable, claim.baseline))
@@ -285,10 +285,10 @@ def build_verdict_table(
 ) -> VerdictTable:
     """Build a table of verdicts with one row per claim.
 
-    Claims refer to the study without overrides. If an override has changed a fixed field of the
-    scene or of the measure, or if the results have been converted to other units, no claim is
-    applicable. If an override has changed the values of a dimension, claims about results that were
-    reduced along this dimension are not applicable.
+    Claims apply to the study as declared, without overrides. If an override has changed a fixed
+    field of the scene or of the measure, or if the results have been converted to other units, no
+    claim is applicable. If an override has changed the values of a dimension, claims about results
+    that were reduced along this dimension are not applicable.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def _is_number(value: object) -> bool:
 def _has_all_overridden_dimensions(
     dataset: xr.Dataset, variable_name: str, study_overrides: Mapping[str, Any]
 ) -> bool:
-    """Return True if a variable has all dimensions with overridden values."""
+    """Return True if a variable has every dimension whose values were overridden."""
     changed = {str(d) for n in study_overrides if n in dataset.coords for d in dataset[n].dims}
     return variable_name not in dataset or changed <= set(dataset[variable_name].dims)
 

@@ -1,4 +1,4 @@
-"""Checks of the declaration of a study.
+"""Checks of study declarations.
 
 The functions check types, names, and the fields that axes vary. The constructor of ``Study`` calls
 most of these functions.
@@ -105,7 +105,7 @@ def check_name_clashes(
 
 
 def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:
-    """Raise InvalidValue if the measure solves for one of the fields.
+    """Raise InvalidValue if one of the fields is computed by the measure.
 
     Parameters
     ----------

@@ -45,11 +45,11 @@ GENERIC_FIGURE_NAMES = frozenset(
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """Panel of a figure, or one panel for each point of the axes in ``facet``.
+    """Panel of a figure, repeated for each point of the axes in ``facet``.
 
-    Functions that receive a dataset are called with the part of the dataset that the panel shows.
-    Functions that receive the data of one curve are called with the part of the dataset that the
-    curve shows.
+    Functions that take a dataset are called with the portion of the results shown in the panel.
+    Functions that take the data of one curve are called with the portion of the results drawn as
+    that curve.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def reference_line(
 
 
 def name_of_figure(plot: Any, study_name: str) -> str:
-    """Return the name that represents a figure in the declaration of a study.
+    """Return the name by which a study declaration refers to a figure.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from rsfstudy.slider import Scene
 
 
 class Cell(NamedTuple):
-    """Cell of a lattice, with a scene and with changes of measure fields.
+    """Cell of a lattice, with its scene and its changed measure fields.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Conversion of dimensionless studies to the units of a rig."""
+"""Conversion of dimensionless studies to rig units."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from rsfstudy.study.study import Study
 def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
     """Convert a dimensionless study to a study with a rig.
 
-    The axes and the ranges of the fits are converted to units of the rig. Fields that the rig
-    defines replace the fields of the base scene.
+    The axes and the fit ranges are converted to rig units. Fields defined by the rig replace the
+    corresponding fields of the base scene.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
 
 
 def _convert_reduction_range_to_rig_units(reduction: Any, scale: float | None) -> Any:
-    """Convert the coordinate range of a reduction to units of a rig.
+    """Convert the coordinate range of a reduction to rig units.
 
     A reduction without a range is returned unchanged.
     """

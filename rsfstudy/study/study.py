@@ -222,7 +222,7 @@ class Study:
 
     @cached_property
     def user_classes(self) -> tuple[type | UserPart, ...]:
-        """User-defined parts, user-defined stepper and classes of the measure.
+        """Classes of the measure, user-defined parts and the user-defined stepper.
 
         The provenance of the results contains a digest of the code of all classes in this tuple.
         """
@@ -241,15 +241,15 @@ class Study:
     def scene_field_names(self) -> frozenset[str]:
         """Names of all fields that determine the scene of a cell.
 
-        In a study with a rig, the set also contains the axis fields with units.
+        If the study has a rig, the set also contains the axis fields that have units.
         """
         return frozenset({*self.scene_fields, *self.units})
 
     @cached_property
     def scene_builder(self) -> LatticeScenesOnRig | None:
-        """Converter from axis values with units to scene fields.
+        """Object that converts axis values with units to scene fields.
 
-        The converter is None if the study has no rig.
+        The property is None if the study has no rig.
         """
         return LatticeScenesOnRig(self.rig, self.base, self.axes) if self.rig else None
 
@@ -432,7 +432,7 @@ class Study:
 
     @cached_property
     def _inapplicable_base_fields(self) -> frozenset[str]:
-        """Fields that have no meaning for the parts of the base scene.
+        """Fields that do not apply to the parts of the base scene.
 
         The set is valid for cells in which no axis selects a part.
         """
@@ -442,7 +442,7 @@ class Study:
         )
 
     def _compute_cell_changes(self, axis_rows: Sequence[AxisRow]) -> CellChanges:
-        """Compute the changed fields of the cell at one point of each axis."""
+        """Compute the changed fields of the cell at the given axis points."""
         given, of_measure = self.split_rows(axis_rows)
         of_scene = self.scene_fields_of_row(given)
         if _SLOT_AND_PART_SELECTING_FIELDS.isdisjoint(
@@ -466,7 +466,7 @@ class Study:
         return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
 
     def _build_cell(self, axis_rows: Sequence[AxisRow]) -> Cell:
-        """Build the cell at one point of each axis."""
+        """Build the cell at the given axis points."""
         try:
             return self._compute_cell_changes(axis_rows).build_cell(self.base)
         except InvalidValue as error:
@@ -600,7 +600,7 @@ class Study:
     def _make_axis(self, field_name: str, values: Sequence[Any], units: str = "") -> Axis:
         """Create an axis that varies one field.
 
-        In a study with a rig, numbers without units are interpreted in ``units``.
+        For a study with a rig, numbers without units are assumed to be in ``units``.
         """
         if self.rig is None:
             return Axis(field_name, values)

@@ -15,7 +15,7 @@ STUDIES_PACKAGE = "rsfstudy.named_studies"
 
 
 def study_names() -> tuple[str, ...]:
-    """Return the names of the named studies.
+    """Return the names of all studies in the folder ``studies``.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def study_titles() -> dict[str, str]:
 
 
 def _read_title_from_source(source_code: bytes) -> str:
-    """Return the title in the source code of a study."""
+    """Read the title of a study from its source code."""
     # The source code before the declaration is not parsed, because parsing it would double the run
     # time.
     declared = ast.parse(source_code[source_code.index(b"\nstudy = ") :]).body[0]

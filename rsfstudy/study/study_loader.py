@@ -117,7 +117,7 @@ def _is_module_in_directory_of(module_name: str, study_file: Path) -> bool:
 
 
 def _describe_error_line(error: BaseException, study_file: Path) -> str:
-    """Return the line of the study file in which an error was raised.
+    """Return the line of the study file that raised an error.
 
     The string is empty if the error was not raised in the study file.
     """

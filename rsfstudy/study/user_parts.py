@@ -1,4 +1,4 @@
-"""User-defined parts of the slider in the declaration of a study."""
+"""User-defined slider parts in study declarations."""
 
 from __future__ import annotations
 

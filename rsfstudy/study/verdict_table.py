@@ -1,4 +1,4 @@
-"""Tables of the verdicts on claims, for terminals and notebooks."""
+"""Tables that list claims and their verdicts, for terminals and notebooks."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Check(CommandResult):
-    """Comparison of the results of studies with published values.
+    """Comparison of study results with published values.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class RecordEvents(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Return the status for success, even if a record has no events."""
+        """Return the exit status for success, even if a record has no events."""
         return EXIT_STATUS_OK
 
     def json_fields(self) -> dict[str, Any]:

@@ -308,6 +308,6 @@ def _print_steps(record: Record) -> None:
 
 
 def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[str, str]:
-    """Return the normal stresses of a step in MPa if they are shown."""
+    """Format the normal stresses of a step in MPa, if the table shows them."""
     stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
     return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if is_shown}

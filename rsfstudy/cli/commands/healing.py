@@ -46,7 +46,7 @@ class HealingResult(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Return a failure status if no hold has a peak of friction on reloading."""
+        """Return a failure status if no hold has a friction peak on reloading."""
         has_peak = bool(self.table["healing"].notnull().any())
         return EXIT_STATUS_OK if has_peak else EXIT_STATUS_FAILED
 

@@ -132,7 +132,7 @@ def print_recomputed_cell(scene: Scene, outcome: Outcome, stored_values: xr.Data
 
 
 def _rows_of_cell(values: Mapping[str, Any], stored_values: xr.Dataset) -> Sequence[dict[str, str]]:
-    """Return one row per number, with the new value and the stored value."""
+    """Return one table row per number, with the new value and the stored value."""
     import numpy as np
 
     rows = []

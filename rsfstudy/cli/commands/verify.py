@@ -45,7 +45,7 @@ class Verification(CommandResult):
 
 
 def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, Any]:
-    """Return the part of the JSON output that describes one answer file."""
+    """Return the entry of the JSON output that describes one answer file."""
     problem = comparison.problem
     index = problem.index_values if problem.index_column else None
     return {
@@ -150,9 +150,8 @@ def _write_agreement_figure(
 ) -> None:
     """Draw the number of agreeing digits of each quantity.
 
-    If the function compares a single file and the problem has an index column, such as time, the
-    figure shows the digits against this column. Otherwise the figure shows the digits against the
-    number of the problem.
+    For a single file whose problem has an index column, such as time, the figure shows the digits
+    against this column. Otherwise, the figure shows the digits against the problem number.
     """
     import numpy as np
 

@@ -52,9 +52,9 @@ COORDINATE_RANGE_RTOL = 1e-9
 class Reduction(ConstructorKeywordCheckMixin):
     """Base class of all reductions.
 
-    If you call a reduction, as in ``reduction(dataset)``, it returns a dataset with the new
-    variables. To write your own reduction, derive a frozen dataclass from this class. All fields
-    except ``name`` and ``of`` are options of the reduction. A reduction must define one method::
+    Calling a reduction, as in ``reduction(dataset)``, returns a dataset with the new variables. To
+    write your own reduction, derive a frozen dataclass from this class. All fields except ``name``
+    and ``of`` are options of the reduction. A reduction must define one method::
 
         __call__(self, dataset) -> xarray.Dataset
 
@@ -174,7 +174,7 @@ class Reduction(ConstructorKeywordCheckMixin):
         return status
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the result with respect to the cells.
+        """Compute the derivatives of the result with respect to the cell values.
 
         A subclass must override this method to propagate the numerical errors of the cells to the
         result. The base class returns no derivatives, so errors are not propagated.
@@ -427,7 +427,7 @@ def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity
 
 
 def _symbol_in_other_units(variable_name: str, variable_attributes: Mapping[Any, Any]) -> str:
-    """Return the symbol of a quantity of the vocabulary that is stored in other units.
+    """Return the symbol of a vocabulary quantity that is stored in other units.
 
     The symbol of a normalised quantity is a quotient, which is valid only without units.
     """

@@ -1,7 +1,8 @@
 """Reductions that find boundaries and level crossings.
 
-A ``Boundary`` is located between cells with values below and above a threshold. An ``Inverse``
-interpolates a smooth variable to find the coordinate value at which the variable reaches a level.
+A ``Boundary`` lies between two neighbouring cells whose values are on opposite sides of a
+threshold. An ``Inverse`` interpolates a smooth variable to find the coordinate value at which the
+variable reaches a level.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ _LOG_STEP_OF_DERIVATIVES = 1e-6
 class Boundary(Reduction):
     """Boundary between cells with values below and above a threshold.
 
-    The boundary is not interpolated. The result only shows that the boundary is between two
-    neighbouring cells. A cell is ignored if the difference between its value and the threshold does
-    not exceed the numerical error of the value.
+    The boundary is not interpolated: the reduction only finds the two neighbouring cells that
+    enclose the boundary. A cell is ignored if the difference between its value and the threshold
+    does not exceed the numerical error of the value.
 
     Parameters
     ----------
@@ -328,7 +329,7 @@ def _crossing_position_derivatives(
 ) -> np.ndarray:
     """Return the derivatives of the crossing position.
 
-    The derivatives are 0 if there is no crossing.
+    All derivatives are 0 if the curve does not cross the level.
     """
     x, y, places = _take_logs_of_positive_samples(values, coordinate)
     slopes = np.zeros(values.size)

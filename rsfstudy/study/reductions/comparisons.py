@@ -104,7 +104,7 @@ class Difference(Reduction):
         return xr.ones_like(values), -xr.ones_like(values)
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """Return the larger status code of each point and the reference point.
+        """Combine the status of each point with the status of the reference point.
 
         Parameters
         ----------
@@ -323,9 +323,9 @@ class Range(Reduction):
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """Compute the derivatives of the range.
 
-        The derivative is 1 for two cells: the cell with the largest value plus error, and the cell
-        with the smallest value minus error. The sign of a derivative has no influence on the
-        propagated error.
+        The derivative is 1 for the cell whose value plus error is largest, and for the cell whose
+        value minus error is smallest. The sign of a derivative has no influence on the propagated
+        error.
 
         Parameters
         ----------
@@ -423,7 +423,7 @@ class ClosedFormRatio(Reduction):
         return xr.Dataset({self.name: ratio, **beside})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the ratio, which are 1 / closed-form solution.
+        """Compute the derivatives of the ratio (the reciprocal of the closed form).
 
         Parameters
         ----------

@@ -147,7 +147,7 @@ class LinearFit(Reduction):
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the slope with respect to the cells.
+        """Compute the derivatives of the slope with respect to the cell values.
 
         The slope is a linear combination of the values, and the derivatives are the coefficients.
 
@@ -400,7 +400,7 @@ class PowerLaw(SemilogFit):
         return self.transform_abscissa(values)
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the exponent with respect to the cells.
+        """Compute the derivatives of the exponent with respect to the cell values.
 
         The derivatives are the coefficients of the linear fit divided by ``ln(10) * of``.
 

@@ -1,7 +1,7 @@
 """Units and scales of the results of reductions.
 
-The units of a result follow from the units of the variables that the reduction used, and never from
-the name of the result.
+The units of a result are derived from the units of the input variables, never from the name of the
+result.
 """
 
 from __future__ import annotations

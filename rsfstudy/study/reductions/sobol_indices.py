@@ -32,10 +32,10 @@ class SobolIndices(Reduction):
 
     The first-order index of a quantity is the share of the variance that is caused only by this
     quantity, without interactions with other quantities. The total index is the share of the
-    variance that remains if all other quantities are fixed. The 95 % confidence intervals are
-    computed by bootstrapping the sample points. If a cell failed or has no value, all indices are
-    NaN, because the remaining samples would have a different distribution. The indices are computed
-    by `scipy.stats.sobol_indices`.
+    variance that would remain if all other quantities were known exactly. The 95 % confidence
+    intervals are computed by bootstrapping the sample points. If a cell failed or has no value, all
+    indices are NaN, because the remaining samples would have a different distribution. The indices
+    are computed by `scipy.stats.sobol_indices`.
 
     Parameters
     ----------

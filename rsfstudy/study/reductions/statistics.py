@@ -85,7 +85,7 @@ class _SampleStatistic(Reduction):
         raise TypeError(f"{type(self).__name__} does not define compute")
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compute the statistic along the dimension of the samples.
+        """Compute the statistic along the sample dimension.
 
         Parameters
         ----------
@@ -203,7 +203,7 @@ class Mean(_SampleStatistic):
         return of.mean(self.over), standard_deviation(of, self.over) / count**0.5
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the mean, which are 1 / number of samples.
+        """Compute the derivatives of the mean (the reciprocal of the sample count).
 
         Parameters
         ----------
@@ -319,8 +319,8 @@ class Quantile(_SampleStatistic):
     """Quantile of a variable over samples.
 
     The quantile is interpolated linearly between two neighbouring samples. The standard error is
-    half the difference between two other quantiles. The levels of these two quantiles are ``level``
-    plus one binomial standard deviation and ``level`` minus one binomial standard deviation.
+    half the difference between two other quantiles. These two quantiles lie one binomial standard
+    deviation above and below ``level``.
 
     Parameters
     ----------
@@ -403,7 +403,7 @@ class Quantile(_SampleStatistic):
         return found[0], 0.5 * (found[2] - found[1])
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compute the statistic along the dimension of the samples.
+        """Compute the statistic along the sample dimension.
 
         If the variable has error estimates, the error of the quantile is computed from two bounds.
         The upper bound is the quantile of the values plus their errors, and the lower bound is the
@@ -457,7 +457,7 @@ def _interpolated_quantile(
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class StatusShares(Reduction):
-    """Shares of the samples with each status, including failures.
+    """Share of the samples that have each status, including failures.
 
     The standard error of a share is the standard deviation of the posterior beta distribution for a
     uniform prior. Therefore, the standard error is positive even if the share is 0 or 1.
@@ -515,7 +515,7 @@ class StatusShares(Reduction):
         return status.where(status == int(Status.PENDING), int(Status.OK))
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compute the shares along the dimension of the samples.
+        """Compute the shares along the sample dimension.
 
         Parameters
         ----------
@@ -591,7 +591,7 @@ class Logarithm(Reduction):
         return xr.Dataset({self.name: logarithm.drop_attrs(deep=False).assign_attrs(note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the logarithm, which are 1 / variable.
+        """Compute the derivatives of the logarithm (the reciprocal of the variable).
 
         Parameters
         ----------

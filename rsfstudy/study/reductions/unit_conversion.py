@@ -1,4 +1,4 @@
-"""Conversion of results to units of a rig, for use in other reductions."""
+"""Conversion of results to rig units, as input for other reductions."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class InUnits(Reduction):
-    """Conversion of a variable to units of a rig, with separate scales for each cell.
+    """Conversion of a variable to rig units, using the scales of each cell.
 
-    Convert a variable before you compute its mean over samples with different scales. A mean of the
-    dimensionless values would combine values in different units.
+    Convert a variable before you compute its mean over samples with different scales. The mean of
+    the dimensionless values would combine values that have different scales.
 
     Parameters
     ----------
