@@ -80,7 +80,7 @@ def known_value_claim(
     Returns
     -------
     Claim
-        Claim on the variable.
+        Claim about the variable.
     """
     return Claim(
         id=claim_id,

@@ -1,15 +1,15 @@
 r"""Phase response of a limit cycle, and the recurrence times of a slider with weak noise.
 
 A small change of the spring stress :math:`f` at some point of the cycle shifts all later events in
-time. The phase response :math:`Z` is the time by which they come earlier, per unit change of each
-unknown. The phase response is the periodic solution of the adjoint of the linearised equations
-:math:`dy/dt = F(y)`,
+time. The phase response :math:`Z` is the resulting advance of the later events in time, per unit
+change of each unknown. The phase response is the periodic solution of the adjoint of the linearised
+equations :math:`dy/dt = F(y)`,
 
 .. math::
 
     \frac{dZ}{dt} = -\left(\frac{\partial F}{\partial y}\right)^T Z, \quad Z \cdot F = 1.
 
-White noise of the amplitude :math:`\epsilon` shifts the events at random. The variance of an event
+White noise with the amplitude :math:`\epsilon` shifts the events randomly. The variance of an event
 time grows by :math:`\epsilon^2 D` in each cycle, with :math:`D = \int_0^T Z_f^2 \, dt`, so the
 coefficient of variation of the recurrence interval is :math:`\epsilon \sqrt{D}/T`.
 """
@@ -47,9 +47,9 @@ class _CycleStart(NamedTuple):
 class PhaseResponse(Measure):
     r"""Sensitivity of the recurrence interval to weak white noise.
 
-    The scene must have a limit cycle that repeats after a single event, and must have neither mass
-    nor noise. The results are :math:`\sqrt{D}/T` for noise of the shear stress, and for noise that
-    acts equally on the shear stress and on the state variable.
+    The scene must have a limit cycle with one event per period, and must not include inertia or
+    noise. The results are the values of :math:`\sqrt{D}/T` for two types of noise: noise of the
+    shear stress, and noise that acts equally on the shear stress and on the state variable.
     """
 
     name: ClassVar[str] = "phase_response"

@@ -1,10 +1,10 @@
 """Hard cases for slider codes, with known results.
 
-The cases include slip rates from 10^-1745 to 10^87 V_*, stiffness that differs from the critical
-stiffness in the eighth digit, parameters at the ends of their ranges, masses from zero to very
-large values, and loading that friction cannot balance. If the result is a number, it must agree
-with an independent computation or a closed form to within its error estimate. If a case has no
-result, the computation must end with a status that describes the reason.
+The cases include slip rates from 10^-1745 to 10^87 V_*, a stiffness that differs from the critical
+stiffness only in the eighth digit, and parameters at the ends of their ranges. They also include
+masses from zero to very large values, and loading that friction cannot balance. If the result is a
+number, it must agree with an independent computation or a closed form to within its error estimate.
+If a case has no result, the computation must end with a status that describes the reason.
 """
 
 import math
@@ -385,7 +385,7 @@ add_status_case(
 
 
 def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
-    """Label the rows with the names of the cases.
+    """Label the rows of the figure with the names of the cases.
 
     Parameters
     ----------

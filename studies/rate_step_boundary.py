@@ -89,7 +89,7 @@ figure = Figure(
 
 
 def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
-    """Return a claim on the effect of variable normal stress (C7).
+    """Return a claim about the effect of variable normal stress (C7).
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the relative reduction.
+        Claim about the relative reduction.
     """
     return Claim(
         id="C7",
