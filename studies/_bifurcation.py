@@ -126,8 +126,8 @@ class Bifurcation(Measure):
     events, and its standard error is also computed. If the motion approaches a cycle, the Lyapunov
     exponent is the logarithm of the absolute value of the largest multiplier divided by the period,
     and no standard error is computed. The peaks of a chaotic motion have no error estimate, because
-    a more accurate integration does not reproduce the peaks. The error of the number of events per
-    period is zero, because this number is an integer.
+    a more accurate integration does not reproduce the peaks. The number of events per period is an
+    integer, so its error is zero.
 
     Parameters
     ----------

@@ -380,7 +380,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrato
         return along(t, y, train(t) / amplitude)[-1]
 
     def fast(t: float, y: np.ndarray) -> float:
-        """Return a value that is zero when the remaining time to the event is negligible."""
+        """Return a value that is zero when the event is imminent."""
         return float((y[0] - y[1]) / a - NEGLIGIBLE_TIME_LOG_RATE)
 
     setattr(fast, "terminal", True)  # noqa: B010  # attribute required by SciPy

@@ -1,4 +1,4 @@
-"""Scenes, references and claims that the studies of heat share."""
+"""Scenes, references and claims that all studies of frictional heat use."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -141,13 +141,13 @@ class _ResponseRecord(NamedTuple):
 
     @property
     def drift(self) -> float:
-        """Amplitude of the removed trend relative to the response."""
+        """Amplitude of the removed trend, divided by the amplitude of the response."""
         amplitude = 2.0 * abs(self.harmonics[self.periods]) / len(self.spring_stress)
         return float(abs(self.trend) / (math.pi * self.periods * amplitude))
 
     @property
     def overtones(self) -> np.ndarray:
-        """Fourier coefficients at all periods except the forcing period.
+        """Fourier coefficients of spring stress at all periods except the forcing period.
 
         The coefficients are relative to the coefficient at the forcing period. The mean is not
         included.

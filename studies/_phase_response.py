@@ -160,7 +160,7 @@ class _AdjointSolution:
         return np.array(rates[:-1]) / rates[-1], rates[-1]
 
     def _adjoint_rates(self, length: float, values: np.ndarray) -> np.ndarray:
-        """Return the derivatives of Z, and of the integrals of its squares."""
+        """Return the derivatives of Z and of the integrals of the squared responses."""
         y = self._orbit.sol(length)[:-1]
         z = values[: len(y)]
         slowness = self._flow(y)[1]
@@ -203,7 +203,7 @@ class _AdjointSolution:
 
 @lru_cache(maxsize=8)
 def compute_phase_response(scene: Scene) -> Outcome:
-    """Compute the phase response of a scene without its noise.
+    """Compute the phase response of a scene that has no noise.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def compute_phase_response(scene: Scene) -> Outcome:
 
 @dataclass(frozen=True)
 class NoisyRecurrence(EventStatistics):
-    """Statistics of the events, and the theory for weak noise of the shear stress.
+    """Statistics of the events, and predictions for weak noise of the shear stress.
 
     The fields are described in ``EventStatistics``.
     """

@@ -260,7 +260,7 @@ class SyntheticFit(Measure):
         smooth = integrator.tightened_to(1e-9)
 
         def friction(time: np.ndarray) -> np.ndarray:
-            """Return exact friction at given times."""
+            """Return the exact friction at given times."""
             begins = min(float(time[0]), 0.0)
             pieces = [
                 (begins, before.velocity, 1.0, 0.0),
@@ -381,7 +381,7 @@ class SyntheticFit(Measure):
         return JointModel(tuple(parts))
 
     def _expected_stderrs(self, truth: JointModel, true: ParameterValues) -> np.ndarray:
-        """Compute standard errors from the Fisher information, with the known noise."""
+        """Compute standard errors from the Fisher information and the known noise."""
         correlations = _correlations(self.process, self.rows)
         jacobian = truth.jacobian(true, self._free_parameters)
         information = np.zeros((len(self._free_parameters),) * 2)

@@ -2,10 +2,10 @@
 
 Under the slowness law and with k >= k_cr, the slip rate remains bounded after every velocity step,
 even without inertia. At constant normal stress and k = k_cr, the oscillations continue without
-decay. Peak slip rates can still be very high. After large steps, inertia limits the slip rate, and
-the motion with inertia departs from the quasi-static motion. At variable normal stress and k =
-k_cr, the motion with inertia and the quasi-static motion merge again after the largest steps. In
-all other cases, a difference in stress between the two motions remains.
+decay. Nevertheless, the peak slip rates can be very high. After large steps, inertia limits the
+slip rate, and the motion with inertia departs from the quasi-static motion. At variable normal
+stress and k = k_cr, the motion with inertia and the quasi-static motion merge again after the
+largest steps. In all other cases, a difference in stress between the two motions remains.
 """
 
 import math

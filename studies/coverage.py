@@ -5,10 +5,11 @@ both laws, constant and variable normal stress, and all kinds of dynamics. Each 
 twice: at the requested accuracy, and with a tolerance that is smaller by a factor of 100. The
 measured error is the difference between the two results, reduced by the error estimate of the more
 accurate run. The figure shows the ratio of the measured error to the error estimate of the first
-run. Use --set sample=0:49:50 for more scenes, --set requested_digits=4,7,9 for other accuracies,
-and --set question for quantities that are measured in laboratory tests: rigid response, velocity
-step, healing, and (with --set normal_stress=imposed) normal stress transient and normal stress
-response.
+run. For more scenes, use the option --set sample=0:49:50. For other accuracies, use the option
+--set requested_digits=4,7,9. To test quantities that are measured in laboratory tests, use the
+option --set question with the name of the test: rigid response, velocity step or healing. In
+combination with the option --set normal_stress=imposed, the tests normal stress transient and
+normal stress response are also available.
 """
 
 import math

@@ -1,12 +1,12 @@
 """Critical stiffness of a dilatant fault as a function of drainage.
 
-If pores dilate with slip rate, pore pressure falls, and frictional strength rises until fluid flows
-into the pores. With fast drainage, the critical stiffness is (b - a) sigma_*/D_c, as without a
-fluid. Without drainage, the critical stiffness is (b - a - E) sigma_*/D_c, with E = mu_* eps/(beta
-sigma_*). If E exceeds b - a, the undrained fault is stable at every stiffness. Between these
-limits, the critical stiffness depends on how much fluid flows into the pores while the fault slips
-by D_c. On a soft spring, slow oscillations are unstable even at the strongest dilatancy, because
-fluid has enough time to flow into the pores.
+If pores dilate when the slip rate increases, the pore pressure falls. The frictional strength then
+rises until fluid has flowed into the pores. With fast drainage, the critical stiffness is (b - a)
+sigma_*/D_c, as without a fluid. Without drainage, the critical stiffness is (b - a - E)
+sigma_*/D_c, with E = mu_* eps/(beta sigma_*). If E exceeds b - a, the undrained fault is stable at
+every stiffness. Between these limits, the critical stiffness depends on how much fluid flows into
+the pores while the fault slips by D_c. On a soft spring, slow oscillations are unstable even at the
+strongest dilatancy, because fluid has enough time to flow into the pores.
 """
 
 import numpy as np

@@ -4,7 +4,7 @@ The spring is stiffer than critical at all drainage rates, so steady sliding is 
 step of load point velocity can trigger an instability. The critical step increases with dilatancy,
 in particular at slow drainage. Before an instability, slip becomes much faster than drainage. The
 drained limit of the critical step is therefore reached only at a drainage rate that is a hundred
-times higher than for the stability of steady sliding (see the study ``dilatancy``).
+times higher than for the stability of steady sliding (see the study dilatancy).
 """
 
 from typing import Any

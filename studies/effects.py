@@ -94,8 +94,8 @@ class EffectCost(Measure):
 
     The number of unknowns and the time of a right-hand-side evaluation are reported separately for
     the equations between ruptures and during ruptures. The results also include the fraction of
-    evaluations during ruptures. Times are also reported relative to the simplest scene of the same
-    law, which is quasi-static with constant normal stress.
+    evaluations during ruptures. Times are also reported relative to the simplest scene with the
+    same law, which is quasi-static and has constant normal stress.
     """
 
     name: ClassVar[str] = "effect_cost"

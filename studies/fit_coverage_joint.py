@@ -7,7 +7,7 @@ Correlated noise reduces the effective sample size of a step to 26. In this case
 standard error of the longer slip distance from a single step is about one third. The errors of some
 other parameters are correlated with the error of this slip distance, and their log-likelihood is
 not parabolic. The confidence intervals are therefore computed from the profile likelihood. Full and
-open markers have the same meaning as in the study ``fit_coverage``.
+open markers have the same meaning as in the study fit_coverage.
 """
 
 from dataclasses import replace

@@ -5,7 +5,8 @@ weakened contacts, f_w. For V_w = 10^5 V_*, the static stress drop increases fro
 without flash heating to 0.87 (mu_* - f_w), and the recurrence interval increases in proportion to
 the stress drop. If the weakening velocity is ten times lower, the static stress drop is almost
 equal to mu_* - f_w. When the slip rate reaches its peak, only a twentieth of the static stress drop
-has been released. The lattice also contains V_w = 10^9 V_*, for which flash heating has no effect.
+has been released. For comparison, the lattice also contains V_w = 10^9 V_*. This weakening velocity
+is so high that flash heating has no effect.
 """
 
 import numpy as np

@@ -185,7 +185,7 @@ def add_status_case(label: str, measure: Measure, status: Status, fields: Fields
 
 
 def add_critical_step_case(label: str, **fields: Any) -> None:
-    """Add a case with a critical step from the independent computation.
+    """Add a case whose critical step is known from an independent computation.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def add_critical_step_case(label: str, **fields: Any) -> None:
 
 
 def add_cycle_case(label: str, name: str, **fields: Any) -> None:
-    """Add a case with a limit cycle from the independent computation.
+    """Add a case whose limit cycle is known from an independent computation.
 
     Parameters
     ----------
@@ -423,7 +423,7 @@ def write_text(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
 def plot_errors(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw measured errors as filled markers, and error estimates as open markers.
 
-    Cases without an error are labelled with the name of the status or with the word "exact".
+    If a case has no error to plot, a label shows the name of its status or the word "exact".
 
     Parameters
     ----------

@@ -483,7 +483,7 @@ def pressure_rates(row: xr.Dataset) -> xr.DataArray:
 
 
 def plot_one_to_one_line(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw a line at the pressure change within a time of D_c/V_*.
+    """Draw a line that shows the change of pressure during a time of D_c/V_*.
 
     Parameters
     ----------

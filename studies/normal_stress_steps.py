@@ -5,8 +5,8 @@ is recorded over 20 D_c. An exponential function is fitted to the transient and 
 time of the step, as in the experiments of Linker and Dieterich (1992). The fitted function gives
 estimates of alpha and D_c. Under the slip law, both estimates are correct on a stiff machine. Under
 the slowness law, alpha is too small for steps up and too large for steps down, even on a very stiff
-machine. On a compliant machine, considerable slip occurs before the spring has followed the change
-of strength, so the estimates depend on the machine as much as on the fault.
+machine. On a compliant machine, considerable slip occurs before the spring stress has adjusted to
+the change of strength. The estimates therefore depend on the machine as much as on the fault.
 """
 
 import math
@@ -60,8 +60,8 @@ def remaining_transient(law: str, step: float, ratio: float, slip: float) -> flo
     :math:`y = (r^{-\alpha/b} - 1)\,e^{-\delta}`. The finite stiffness :math:`K` of the machine has
     two effects on the transient. While the spring follows the change of strength, ln V returns to
     zero over a slip of approximately :math:`a r/K`, and the evolution of the state differs from the
-    evolution at :math:`V_*`. Later, the slip rate differs from the velocity of the load point while
-    friction changes.
+    evolution at :math:`V_*`. Later, while friction changes, the slip rate differs from the load
+    point velocity.
 
     Parameters
     ----------

@@ -156,7 +156,7 @@ def resonance_claim(law: str, period: float) -> Claim:
 
 
 def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Claim:
-    """Return a claim about the validity of linear theory at an amplitude (R3).
+    """Return a claim about the validity of linear theory (R3).
 
     Parameters
     ----------

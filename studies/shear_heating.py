@@ -72,7 +72,7 @@ def transition_rate(cooling: float) -> float:
 
 
 def shown_cooling_rates(values: Sequence[float]) -> list[float]:
-    """Return the cooling rates whose curves of steady friction are shown.
+    """Return the cooling rates for which the figure shows the steady friction.
 
     Parameters
     ----------

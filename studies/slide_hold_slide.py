@@ -4,7 +4,8 @@ After steady sliding at V_*, the load point stops for the hold time, and then mo
 Under the slowness law with b > a, relaxation approaches a limit that depends on stiffness. Healing
 increases by b ln 10 per decade of hold time at every stiffness. Without rate weakening, relaxation
 has no limit. Under the slip law, relaxation has no limit either, and the healing per decade
-decreases with stiffness. The measured values then depend on the machine as much as on the fault.
+decreases with stiffness. The values that are measured in such tests therefore depend on the machine
+as much as on the fault.
 """
 
 import math

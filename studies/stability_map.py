@@ -94,7 +94,7 @@ class CycleRegionEdge(Reduction):
         )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Find the bracket of the boundary along stiffness.
+        """Find the two stiffnesses between which the boundary lies.
 
         Parameters
         ----------

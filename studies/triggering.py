@@ -11,13 +11,13 @@ law, the rule of equal Coulomb stress fails close to the critical stiffness. In 
 Coulomb stress change of the critical decrease of normal stress is up to 2.4 times that of the
 critical displacement step, because a decrease of normal stress also lowers the critical stiffness.
 On very stiff springs, an instability occurs only if the slip rate reaches the instability norm
-during the step. The rule of equal Coulomb stress also fails on very stiff springs. The effect of
-normal stress on the state makes decreases of normal stress less effective. The direct effect of the
-critical velocity step, a ln(V_0/V_*), is 0.6 to 1.03 times the stress change of the critical
-displacement step. In most cases, the direct effect is smaller than this stress change, because the
-load point continues to move after a velocity step. Below the critical stiffness, every velocity
-step triggers an instability. For inclined driving, the angle is 60 degrees, and the decrease of
-normal stress is a decrease of sigma_3.
+during the step. The rule of equal Coulomb stress also fails on very stiff springs. If the state
+depends on normal stress, a larger decrease of normal stress is necessary to trigger an instability.
+The direct effect of the critical velocity step, a ln(V_0/V_*), is 0.6 to 1.03 times the stress
+change of the critical displacement step. In most cases, the direct effect is smaller than this
+stress change, because the load point continues to move after a velocity step. Below the critical
+stiffness, every velocity step triggers an instability. For inclined driving, the angle is 60
+degrees, and the decrease of normal stress is a decrease of sigma_3.
 
 The change of Coulomb stress is ``dtau - mu' dsigma``. A displacement d of the load point changes
 shear stress by K d, and normal stress by K d cot(phi). A step of imposed normal stress, or of

@@ -2,10 +2,11 @@
 
 A second state variable with a longer slip distance limits the slip rate. A slider on a spring that
 is slightly softer than critical therefore oscillates, even without inertia and under the slip law
-(Gu et al. 1984; Becker 2000). If the stiffness decreases, the period doubles repeatedly until the
+(Gu et al. 1984; Becker 2000). As the stiffness decreases, the period doubles repeatedly until the
 motion is chaotic. At still lower stiffness, the slip rate is unbounded. The first period doubling
 occurs when a Floquet multiplier of the period-one cycle passes through -1. Below the stiffness of
-the first period doubling, the period-one cycle still exists but is repelling.
+the first period doubling, the period-one cycle still exists, but neighbouring motions diverge from
+it.
 """
 
 import math

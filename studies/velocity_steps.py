@@ -6,8 +6,9 @@ and the estimate of D_c is the displacement over which the evolution decays to 1
 machines, the estimates of a and b are too small. At 10 k_cr, tenfold steps give a value of a that
 is 14 to 40 % too small. The estimate of a - b is correct if friction has reached steady state. The
 error of the estimate of D_c depends on the stiffness of the machine. Under the slowness law, this
-error also depends on the direction of the step. A correction for stiffness does not remove these
-dependences. Under the slip law, large steps up on soft machines end in instability.
+error also depends on the direction of the step. Correcting the estimate for stiffness does not
+remove these two dependences. Under the slip law, large steps up on soft machines end in
+instability.
 """
 
 import math

@@ -128,7 +128,7 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
 
 
 def coulomb_limit_claim(law: str, phase: float) -> Claim:
-    """Return the claim that slow waves trigger at a Coulomb threshold (W2).
+    """Return the claim that slow waves trigger events at a Coulomb threshold (W2).
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def coulomb_limit_claim(law: str, phase: float) -> Claim:
 
 
 def strong_waves_claim(law: str) -> Claim:
-    """Return the claim that strong waves trigger at a Coulomb threshold (W3).
+    """Return the claim that strong waves trigger events at a Coulomb threshold (W3).
 
     Strong waves increase Coulomb stress faster than the load point does.
 

@@ -3,8 +3,8 @@
 The parameters a, b - a and k are uncertain by 10 % each, and their errors are independent. The
 critical displacement step D_c a/(b - a) depends equally on a and on b - a. The stress drop depends
 almost only on b - a. The recurrence interval is the stress drop divided by k V_0, so it depends on
-b - a and on k. First-order and total indices are equal, so the parameters do not interact. Bars are
-95 % confidence intervals.
+b - a and on k. First-order and total indices are equal, so the parameters do not interact. Error
+bars in the figure show 95 % confidence intervals.
 """
 
 import math
