@@ -1,4 +1,4 @@
-r"""Phase response of a limit cycle, and the recurrence times of a slider with weak noise.
+r"""Phase response of a limit cycle, and recurrence times under weak noise.
 
 A small change of the spring stress :math:`f` at some point of the cycle shifts all later events in
 time. The phase response :math:`Z` is the resulting advance of the later events in time, per unit
@@ -37,7 +37,7 @@ THEORY_ACCURACY = Accuracy(rtol=1e-9, engine="compiled")
 
 
 class _CycleStart(NamedTuple):
-    """Unknowns at the start of a cycle without time, and duration of the cycle in D_c/V_*."""
+    """Unknowns except time at the start of a cycle, and cycle duration in D_c/V_*."""
 
     unknowns: np.ndarray
     duration: float
@@ -108,7 +108,7 @@ class PhaseResponse(Measure):
 
 
 def _find_cycle_start(scene: Scene, integrator: Integrator) -> _CycleStart:
-    """Return the point of the limit cycle at which V rises through V_0, and the duration."""
+    """Return the cycle's point at which V rises through V_0, and its duration."""
     if not scene.is_perturbed:
         scene = scene.with_(displacement_step=0.1, load_velocity_ratio=scene.load_velocity)
     asked, times = rise("log_slip_rate", scene.log_load_velocity), []

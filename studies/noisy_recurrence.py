@@ -1,4 +1,4 @@
-"""Coefficient of variation of the recurrence interval against the amplitude of noise.
+"""Coefficient of variation of recurrence intervals against noise amplitude.
 
 White noise in the shear stress causes scatter of the recurrence intervals, which would otherwise be
 equal. For weak noise, the coefficient of variation (CV) follows from the phase response of the
