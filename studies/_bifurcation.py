@@ -1,6 +1,6 @@
 """Peak slip rates of successive events, and Floquet multipliers of the cycle.
 
-The measure ``Bifurcation`` follows a motion event by event. The measure also searches for the
+The measure ``Bifurcation`` integrates a motion event by event. The measure also searches for the
 period-one cycle, which has one event per period, and computes the Floquet multipliers of this
 cycle.
 """
@@ -114,20 +114,20 @@ class Bifurcation(Measure):
     """Peak slip rates of successive events at a constant load point velocity.
 
     The measure discards a transient and then records the peak slip rate of each event. The measure
-    also searches for the period-one cycle near the events that almost repeat the preceding event.
-    The period-one cycle is reported even if it repels neighbouring motions. The Floquet multipliers
-    of this cycle are the eigenvalues of the derivative of the return map, which maps spring stress
-    and states from one maximum of spring stress to the next. The period doubles if a multiplier
-    passes through -1.
+    also searches for the period-one cycle. The search starts from events that almost repeat the
+    preceding event. The period-one cycle is reported even if neighbouring motions diverge from it.
+    The Floquet multipliers of this cycle are the eigenvalues of the derivative of the return map,
+    which maps spring stress and states from one maximum of spring stress to the next. The period of
+    the cycle doubles when a multiplier passes through -1.
 
     A period is reported only if the motion approaches an attracting cycle, and if this cycle closes
     to the requested accuracy. If no period is reported, the status is ``not_periodic``. In this
-    case, the Lyapunov exponent is the mean growth of small perturbations over the recorded events,
-    and has a standard error. If the motion approaches a cycle, the Lyapunov exponent is the
-    logarithm of the absolute value of the largest multiplier divided by the period, without a
-    standard error. The peaks of a chaotic motion have no error estimate, because a more accurate
-    integration does not reproduce the peaks. The error of the number of events per period is zero,
-    because this number is an integer.
+    case, the Lyapunov exponent is the mean growth rate of small perturbations over the recorded
+    events, and its standard error is also computed. If the motion approaches a cycle, the Lyapunov
+    exponent is the logarithm of the absolute value of the largest multiplier divided by the period,
+    and no standard error is computed. The peaks of a chaotic motion have no error estimate, because
+    a more accurate integration does not reproduce the peaks. The number of events per period is an
+    integer, so its error is zero.
 
     Parameters
     ----------
@@ -273,10 +273,10 @@ def _one_event_cycle_outputs(
 def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
     """Compute the mean logarithmic growth of small perturbations per event.
 
-    The perturbation is aligned with the direction of fastest growth before growth is averaged. The
-    alignment uses 16 events, or half of the events if there are fewer than 32. The standard error
-    is computed from the means of approximately ``sqrt(n)`` blocks of events, where ``n`` is the
-    number of averaged events.
+    Before the growth is averaged, the perturbation is followed over several events until it is
+    aligned with the direction of fastest growth. This alignment takes 16 events, or half of the
+    events if there are fewer than 32. The standard error is computed from the means of
+    approximately ``sqrt(n)`` blocks of events, where ``n`` is the number of averaged events.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> PeriodicOrbit
 
 
 def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
-    """Return the cycles that almost repeat, the closest repetition first.
+    """Return the cycles that almost repeat, in order of increasing mismatch.
 
     Cycles in the first half of the motion are ignored. A cycle almost repeats if the states at its
     end are close to the states at its beginning. The cycles are sorted by the largest change of a

@@ -1,8 +1,8 @@
 """Clock advance of the next stick-slip event by a train of waves.
 
 The measure ``ClockAdvance`` computes the clock advance from motions with and without the waves. The
-measure also computes two approximations: first-order perturbation theory, and a threshold of
-Coulomb stress.
+measure also computes two approximations of the clock advance. One approximation uses first-order
+perturbation theory, and the other uses a threshold of Coulomb stress.
 """
 
 import math
@@ -106,7 +106,7 @@ class ClockAdvance(Measure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
-        """Check that the train begins between two events."""
+        """Check that the wave train begins between two events."""
         if not 0.0 < self.cycle_phase < 1.0:
             raise InvalidValue("cycle_phase", self.cycle_phase, "must lie between 0 and 1")
 
@@ -164,12 +164,12 @@ class ClockAdvance(Measure):
         scene : Scene
             Parameters of the slider.
         values : mapping
-            Results by name.
+            Results, keyed by name.
 
         Returns
         -------
         mapping
-            Scale of the error of each result.
+            Error scale of each result.
         """
         return dict.fromkeys(("clock_advance", INTERVAL), 2.0 * values[INTERVAL])
 
@@ -258,15 +258,14 @@ def _find_free_cycle(
 
 
 def _event_specifications(scene: Scene) -> list[EventSpecification]:
-    """Return the event at which slip rate rises through the instability norm."""
+    """Return the specification of the event at which V reaches the instability norm."""
     return [rise("log_slip_rate", scene.log_instability_rate)]
 
 
 def _event_times(motion: Iterator[Event], count: int) -> list[float]:
     """Return the times of the first events of a motion.
 
-    The only event specification of the motion must be the rise of slip rate through the instability
-    norm.
+    The motion must detect only one type of event: the slip rate rises through the instability norm.
     """
     return list(islice((event.time for event in motion if event.specification is not None), count))
 
@@ -295,7 +294,7 @@ def _normal_stress_change(scene: Scene) -> Callable[[float], float]:
     turn = 2.0 * math.pi / loading.oscillation_period
 
     def train(time: float) -> float:
-        """Return the change of normal stress at a time."""
+        """Return the change of normal stress at a given time."""
         return amplitude * math.sin(turn * time + angle) if 0.0 <= time < lasts else 0.0
 
     return train
@@ -316,9 +315,9 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrato
         \dot{\delta\Psi} &= -e^{-\Psi/b}\,\delta\Psi - b V\,\delta x
         \quad \text{(slowness law)},
 
-    with :math:`x = \ln(V/V_*)`. During nucleation the perturbed motion becomes the original motion,
-    shifted in time by the clock advance :math:`\Delta t`, so that
-    :math:`\delta x = \Delta t\,\dot x`.
+    with :math:`x = \ln(V/V_*)`. During nucleation, the perturbed motion converges to the original
+    motion, which is shifted in time by the clock advance :math:`\Delta t`, so that :math:`\delta x
+    = \Delta t\,\dot x`.
 
     Parameters
     ----------
@@ -381,7 +380,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrato
         return along(t, y, train(t) / amplitude)[-1]
 
     def fast(t: float, y: np.ndarray) -> float:
-        """Return zero when the remaining time to the event is negligible."""
+        """Return a value that is zero when the event is imminent."""
         return float((y[0] - y[1]) / a - NEGLIGIBLE_TIME_LOG_RATE)
 
     setattr(fast, "terminal", True)  # noqa: B010  # attribute required by SciPy
@@ -404,7 +403,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrato
 
 
 def _coulomb_clock_advance(scene: Scene, found: _NextEvent) -> float:
-    r"""Compute the clock advance for a threshold of Coulomb stress.
+    r"""Compute the clock advance that a threshold of Coulomb stress predicts.
 
     The load point stresses the spring at the rate :math:`K V_0`. In the motion without waves, the
     onset of the event is at the time :math:`t_1`, and the friction coefficient at the onset is
@@ -431,7 +430,7 @@ def _coulomb_clock_advance(scene: Scene, found: _NextEvent) -> float:
     train = _normal_stress_change(scene)
 
     def missing(time: float) -> float:
-        """Return the difference between the threshold and Coulomb stress."""
+        """Return the threshold minus the current Coulomb stress."""
         return found.train_start * train(time) - loading * (time - found.remaining_time)
 
     times = np.linspace(0.0, 1.01 * latest, COULOMB_STRESS_SAMPLES).tolist()

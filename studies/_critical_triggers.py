@@ -97,16 +97,16 @@ _OUTPUTS = (
 class Triggers(Measure):
     """Critical decrease of normal stress, displacement step and velocity step.
 
-    The results include the critical steps and the corresponding stress changes. A decrease of
-    normal stress and a displacement step are converted to a change of Coulomb stress. A velocity
-    step is converted to its direct effect.
+    The results include the critical steps and the corresponding stress changes. Decreases of normal
+    stress and displacement steps are converted to changes of Coulomb stress. Velocity steps are
+    converted to the stress change that corresponds to the direct effect.
 
-    The load point is held after a decrease of normal stress or a displacement step unless the scene
-    specifies ``load_velocity_ratio``. The search for each critical step has a separate work budget
-    and a separate status. If a critical step does not exist, the message explains the reason. If a
-    search fails, the outcome has the status of the first failed search. If no search fails, the
-    outcome is successful if a critical decrease of normal stress and a critical displacement step
-    exist. The critical velocity step is optional.
+    After a decrease of normal stress or a displacement step, the load point does not move, unless
+    the scene specifies ``load_velocity_ratio``. The search for each critical step has a separate
+    work budget and a separate status. If a critical step does not exist, the message explains the
+    reason. If a search fails, the outcome has the status of the first failed search. If all
+    searches succeed, the outcome is successful only if a critical decrease of normal stress and a
+    critical displacement step exist. A critical velocity step need not exist.
     """
 
     name: ClassVar[str] = "triggers"

@@ -1,4 +1,4 @@
-"""Scene and reference of the studies with pore fluids."""
+"""Scene and literature reference that all studies of pore fluids use."""
 
 from rsfstudy import Scene
 

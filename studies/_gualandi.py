@@ -1,21 +1,23 @@
 r"""Deterministic model of the laboratory earthquakes of Gualandi et al. (2023).
 
 The model is a spring-slider with the slip law, radiation damping and a pore fluid. The pores close
-when the slip rate increases, and the porosity evolves over a slip distance of its own. Between 16.6
-and 21.9 MPa, the cycle of one event is unstable, and long and short recurrence intervals alternate.
-The coefficient of variation (CV) of the intervals is then the difference of the two intervals
-divided by their sum. At all other normal stresses of the experiments, all intervals are equal.
+when the slip rate increases, and the porosity evolves over a separate slip distance. At normal
+stresses between 16.6 and 21.9 MPa, the cycle with one event per period is unstable, and long and
+short recurrence intervals alternate. The coefficient of variation (CV) of the intervals is then the
+difference of the two intervals divided by their sum. At all other normal stresses of the
+experiments, all intervals are equal.
 
 The stochastic model of the paper adds white noise to shear stress and to effective normal stress
-at constant slip rate, so the noise also acts on the state variable. Scenes with noise of stress
-differ from this model, because the slip rate responds to the noise immediately.
+at constant slip rate, so the noise also acts on the state variable. Scenes of rsfstudy in which the
+stress has noise differ from this stochastic model, because their slip rate responds to the noise
+immediately.
 
 Gualandi et al. denote the unknowns by :math:`x = \ln(V/V_0)`, :math:`y = (\tau - \mu_0 \sigma)/(a
 \sigma)`, :math:`z = (\varphi - \varphi_0)/(\lambda \beta \sigma)` and :math:`u = -p/(\lambda
 \sigma)` with :math:`\lambda = a/\mu_0`. Their normal stress :math:`\sigma` includes the pore
 pressure, which is the atmospheric pressure :math:`p_0` in steady sliding. Stresses of a scene are
-normalised by the effective normal stress of steady sliding, so :math:`\sigma_* = \sigma - p_0`. The
-two models are then equal, with the unknowns
+normalised by the effective normal stress of steady sliding, so :math:`\sigma_* = \sigma - p_0`.
+With this normalisation, the two models are equal, and the unknowns are related by
 
 .. math::
 

@@ -1,4 +1,4 @@
-"""Scenes, references and claims that the studies of heat share."""
+"""Scenes, references and claims that all studies of frictional heat use."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -80,7 +80,7 @@ def known_value_claim(
     Returns
     -------
     Claim
-        Claim on the variable.
+        Claim about the variable.
     """
     return Claim(
         id=claim_id,

@@ -1,7 +1,7 @@
 """Problems with known answers, and measures that solve them.
 
-A problem consists of a scene, a measure, and the known value of one of its outputs. The studies
-that test the accuracy of the package register their problems in this module.
+A problem consists of a scene, a measure, and the known value of one output of the measure. The
+studies that test the accuracy of the package register their problems in this module.
 """
 
 import json
@@ -174,7 +174,7 @@ class ProblemMeasure(Measure):
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
         """Return the problems that a description contains.
 
-        The entry ``problems`` is removed from the description.
+        The ``problems`` entry is removed from the description.
 
         Parameters
         ----------
@@ -224,8 +224,8 @@ class ProblemMeasure(Measure):
         Raises
         ------
         InvalidValue
-            If no known problem has the scene, for example because an axis or a fixed value was
-            changed.
+            If the scene does not belong to any known problem, for example because the user changed
+            an axis or a fixed value.
         """
         for problem in self.problems:
             if problem.scene == scene:

@@ -122,7 +122,7 @@ def law_style(row: xr.Dataset) -> dict[str, Any]:
 
 
 def panel_by_normal_stress(x: str, y: str, log: str, **more: Any) -> Panel:
-    """Return one panel per normal stress condition, with one curve per law.
+    """Return a panel declaration with one panel per condition and one curve per law.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Synthetic records with typical imperfections of laboratory records.
 
-Each kind of imperfection converts the friction of a velocity step into a record. The conversion
-selects the sample times, adds noise, and modifies friction or displacement in the same way as data
-acquisition systems do.
+Each kind of imperfection converts the exact friction after a velocity step to a noisy record. The
+conversion selects the sample times, adds noise, and modifies friction or displacement as a data
+acquisition system would.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class ExactResponse(NamedTuple):
     friction : callable
         Function that returns friction at given times in s.
     noise_size : float
-        Standard deviation of the noise of friction.
+        Standard deviation of the friction noise.
     """
 
     step: float
@@ -114,14 +114,14 @@ class NoiseKind:
 
     @property
     def filter(self) -> str:
-        """Filter that is passed to the fit, or an empty string."""
+        """Filter that is passed to the fit. An empty string means no filter."""
         return f"mean {self.mean_of / self.rate[1]!r}" if self.states_filter else ""
 
     @property
     def finds_steps(self) -> bool:
         """True if the fit detects the steps in the recorded displacement.
 
-        If the fit does not detect the steps, the exact steps are passed to the fit.
+        If the value is False, the exact steps are passed to the fit instead.
         """
         return self.displacement_noise > 0.0 or self.displacement_quantum > 0.0
 
@@ -169,8 +169,8 @@ class NoiseKind:
     def _times(self, truth: ExactResponse, rng: np.random.Generator, margin: int) -> np.ndarray:
         """Return the sample times.
 
-        The times contain ``margin`` additional rows at each end, because the running mean shortens
-        the record.
+        The argument ``margin`` is the number of additional rows at each end. These rows are needed
+        because the running mean shortens the record.
         """
         slow, fast = (1.0 / rate for rate in self.rate)
         first = np.arange(-margin * slow + 0.5 * slow, truth.step, slow)

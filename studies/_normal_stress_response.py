@@ -1,6 +1,6 @@
 """Amplitude and phase of spring stress under oscillating normal stress.
 
-The measure ``NormalStressResponse`` follows a motion until transients have decayed, and then
+The measure ``NormalStressResponse`` integrates a motion until transients have decayed. It then
 computes the Fourier coefficient of spring stress at the forcing period.
 """
 
@@ -100,7 +100,7 @@ class _ResponsePeriod(NamedTuple):
     duration : float
         Period in D_c/V_*.
     forcing_periods : int
-        Period in forcing periods.
+        Response period, as a number of forcing periods.
     decay_time : float, default: 0.0
         Time in which small perturbations decay by a factor of e, in response periods.
     """
@@ -141,13 +141,13 @@ class _ResponseRecord(NamedTuple):
 
     @property
     def drift(self) -> float:
-        """Amplitude of the removed trend relative to the response."""
+        """Amplitude of the removed trend, divided by the amplitude of the response."""
         amplitude = 2.0 * abs(self.harmonics[self.periods]) / len(self.spring_stress)
         return float(abs(self.trend) / (math.pi * self.periods * amplitude))
 
     @property
     def overtones(self) -> np.ndarray:
-        """Fourier coefficients at all periods except the forcing period.
+        """Fourier coefficients of spring stress at all periods except the forcing period.
 
         The coefficients are relative to the coefficient at the forcing period. The mean is not
         included.
@@ -161,8 +161,8 @@ class _ResponseRecord(NamedTuple):
 
         Let :math:`D` be the norm of the resolved overtones, and :math:`B` the norm of the upper
         quarter of these overtones. The unresolved overtones are assumed to have the norm :math:`B`
-        as well. The unresolved overtones are missing in the sum of squares, which changes the norm
-        by up to :math:`B^2/(2D)`. Aliasing also folds the unresolved overtones onto the upper
+        as well. The sum of squares does not include the unresolved overtones, which changes the
+        norm by up to :math:`B^2/(2D)`. Aliasing also folds the unresolved overtones onto the upper
         quarter, which changes the norm by up to :math:`3B^2/(2D)`. The sum of both changes is
         :math:`2B^2/D`.
         """
@@ -185,8 +185,8 @@ class _ResponseRecord(NamedTuple):
     def equals_in_median(self, other: _ResponseRecord) -> bool:
         """Return True if two records of spring stress agree in the median.
 
-        The comparison uses the median difference, because a sudden change of spring stress may be
-        shifted by one sample.
+        The comparison uses the median difference instead of the maximum, because a sudden change of
+        spring stress may occur one sample earlier or later.
 
         Parameters
         ----------
@@ -224,10 +224,10 @@ class _ResponseRecord(NamedTuple):
 class NormalStressResponse(RecordingMeasure):
     """Response of spring stress to oscillating normal stress.
 
-    The motion is followed until the transient has decayed to a tenth of the requested accuracy. The
-    decay time is computed from the slowest decay rate of small perturbations. The response is then
-    recorded twice. The second record begins after the transient has decayed by another factor of e,
-    and provides the results.
+    The motion is integrated until the transient has decayed to a tenth of the requested accuracy.
+    The decay time is computed from the slowest decay rate of small perturbations. The response is
+    then recorded twice. The second record begins after the transient has decayed by another factor
+    of e. The results are computed from the second record.
 
     The response to strong oscillations may repeat only after 2, 3 or 4 forcing periods. The result
     ``response_period`` reports the number of forcing periods, and all other results refer to a
@@ -278,12 +278,12 @@ class NormalStressResponse(RecordingMeasure):
         scene : Scene
             Parameters of the slider.
         values : mapping
-            Results by name.
+            Results, keyed by name.
 
         Returns
         -------
         mapping
-            Scale of the error of each result.
+            Error scale of each result.
         """
         stressed = scene.a / scene.oscillation_amplitude
         size = values["gain"] + stressed
@@ -586,7 +586,7 @@ def _estimate_errors(
     Returns
     -------
     dict
-        Errors by name.
+        Errors, keyed by name.
     """
     unseen = record.resolution_error + moved + record.drift
     hidden = {

@@ -146,12 +146,11 @@ class NormalStressTransient(RecordingMeasure):
     Parameters
     ----------
     fit_from : float, default: 0.5
-        Smaller one of the two slips at which the exponential function is fitted, in D_c since the
-        step. At this slip, the spring must have followed the change of strength, so that the slip
-        rate differs from V_* by less than a factor of two.
+        Slip since the step, in D_c, at the first of the two points of the exponential fit. At this
+        slip, the spring must have followed the change of strength, so that the slip rate differs
+        from V_* by less than a factor of two.
     fit_to : float, default: 1.5
-        Larger one of the two slips at which the exponential function is fitted, in D_c since the
-        step.
+        Slip since the step, in D_c, at the second of the two points of the exponential fit.
     record : float, default: 30.0
         Load point displacement over which friction is recorded, in D_c. Friction at the end of the
         record is regarded as steady.
@@ -186,20 +185,20 @@ class NormalStressTransient(RecordingMeasure):
         """Return the scales of the numerical errors.
 
         The scale of a result is the product of two factors: the absolute value of the result, and
-        one plus the ratio of ``a`` to the transient that remains at ``fit_to``. The relative error
-        may therefore be larger if the transient is small.
+        one plus the ratio of ``a`` to the transient that remains at ``fit_to``. A larger relative
+        error is therefore permitted if the transient is small.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
         values : mapping
-            Results by name.
+            Results, keyed by name.
 
         Returns
         -------
         mapping
-            Scale of the error of each result.
+            Error scale of each result.
         """
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         distance = values["apparent_slip_distance"]
@@ -369,9 +368,10 @@ class NormalStressTransient(RecordingMeasure):
     ) -> dict[str, float]:
         """Return the derivatives of the results with respect to friction.
 
-        Friction is read at ``fit_from``, ``fit_to`` and a slip of D_c, and at the end of the
-        record. The results depend on differences between two values of friction. The derivatives
-        contain a factor of two, because each of the two values may have an error.
+        The measure evaluates friction at four points: at the slips ``fit_from``, ``fit_to`` and
+        D_c, and at the end of the record. The results depend on differences between two values of
+        friction. The derivatives contain a factor of two, because each of the two values may have
+        an error.
         """
         first, last = (
             abs(record.remaining_transient(self.fit_from)),

@@ -15,10 +15,11 @@ from rsfstudy.motion import maximum, minimum
 class PeakStatistics(EventStatistics):
     """Statistics of the intervals between peaks of slip rate.
 
-    The fields are described in ``EventStatistics``. If the scene has noise, slip rates have many
-    peaks, and the events are those of ``EventStatistics``. Without noise, an event is a peak of the
-    slip rate. If long and short intervals alternate, the CV of the intervals between peaks differs
-    from the CV of the intervals between maxima of spring stress, which ``EventStatistics`` uses.
+    The docstring of ``EventStatistics`` describes the fields. In scenes without noise, each peak of
+    the slip rate is an event. In scenes with noise, the slip rate has many peaks, so events are
+    defined as in ``EventStatistics``. If long and short intervals alternate, the CV of the
+    intervals between peaks differs from the CV of the intervals between maxima of spring stress,
+    which ``EventStatistics`` uses.
     """
 
     name: ClassVar[str] = "peak_statistics"

@@ -1,15 +1,15 @@
-r"""Phase response of a limit cycle, and the recurrence times of a slider with weak noise.
+r"""Phase response of a limit cycle, and recurrence times under weak noise.
 
 A small change of the spring stress :math:`f` at some point of the cycle shifts all later events in
-time. The phase response :math:`Z` is the time by which they come earlier, per unit change of each
-unknown. The phase response is the periodic solution of the adjoint of the linearised equations
-:math:`dy/dt = F(y)`,
+time. The phase response :math:`Z` is the resulting advance of the later events in time, per unit
+change of each unknown. The phase response is the periodic solution of the adjoint of the linearised
+equations :math:`dy/dt = F(y)`,
 
 .. math::
 
     \frac{dZ}{dt} = -\left(\frac{\partial F}{\partial y}\right)^T Z, \quad Z \cdot F = 1.
 
-White noise of the amplitude :math:`\epsilon` shifts the events at random. The variance of an event
+White noise with the amplitude :math:`\epsilon` shifts the events randomly. The variance of an event
 time grows by :math:`\epsilon^2 D` in each cycle, with :math:`D = \int_0^T Z_f^2 \, dt`, so the
 coefficient of variation of the recurrence interval is :math:`\epsilon \sqrt{D}/T`.
 """
@@ -37,7 +37,7 @@ THEORY_ACCURACY = Accuracy(rtol=1e-9, engine="compiled")
 
 
 class _CycleStart(NamedTuple):
-    """Unknowns at the start of a cycle without time, and duration of the cycle in D_c/V_*."""
+    """Unknowns except time at the start of a cycle, and cycle duration in D_c/V_*."""
 
     unknowns: np.ndarray
     duration: float
@@ -47,9 +47,9 @@ class _CycleStart(NamedTuple):
 class PhaseResponse(Measure):
     r"""Sensitivity of the recurrence interval to weak white noise.
 
-    The scene must have a limit cycle that repeats after a single event, and must have neither mass
-    nor noise. The results are :math:`\sqrt{D}/T` for noise of the shear stress, and for noise that
-    acts equally on the shear stress and on the state variable.
+    The scene must have a limit cycle with one event per period, and must not include inertia or
+    noise. The results are the values of :math:`\sqrt{D}/T` for two types of noise: noise of the
+    shear stress, and noise that acts equally on the shear stress and on the state variable.
     """
 
     name: ClassVar[str] = "phase_response"
@@ -108,7 +108,7 @@ class PhaseResponse(Measure):
 
 
 def _find_cycle_start(scene: Scene, integrator: Integrator) -> _CycleStart:
-    """Return the point of the limit cycle at which V rises through V_0, and the duration."""
+    """Return the cycle's point at which V rises through V_0, and its duration."""
     if not scene.is_perturbed:
         scene = scene.with_(displacement_step=0.1, load_velocity_ratio=scene.load_velocity)
     asked, times = rise("log_slip_rate", scene.log_load_velocity), []
@@ -160,7 +160,7 @@ class _AdjointSolution:
         return np.array(rates[:-1]) / rates[-1], rates[-1]
 
     def _adjoint_rates(self, length: float, values: np.ndarray) -> np.ndarray:
-        """Return the derivatives of Z, and of the integrals of its squares."""
+        """Return the derivatives of Z and of the integrals of the squared responses."""
         y = self._orbit.sol(length)[:-1]
         z = values[: len(y)]
         slowness = self._flow(y)[1]
@@ -203,7 +203,7 @@ class _AdjointSolution:
 
 @lru_cache(maxsize=8)
 def compute_phase_response(scene: Scene) -> Outcome:
-    """Compute the phase response of a scene without its noise.
+    """Compute the phase response of a scene that has no noise.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def compute_phase_response(scene: Scene) -> Outcome:
 
 @dataclass(frozen=True)
 class NoisyRecurrence(EventStatistics):
-    """Statistics of the events, and the theory for weak noise of the shear stress.
+    """Statistics of the events, and predictions for weak noise of the shear stress.
 
     The fields are described in ``EventStatistics``.
     """

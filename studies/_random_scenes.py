@@ -1,7 +1,7 @@
 """Random scenes, and the quantities that are computed for the scenes.
 
-A question consists of a measure and of the random distributions of the loading parameters. All
-other parameters of a scene are drawn from wide ranges.
+A question consists of a measure and the random distributions of the loading parameters. All other
+parameters of a scene are drawn from wide ranges.
 """
 
 import math

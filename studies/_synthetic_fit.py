@@ -1,7 +1,7 @@
 """Fits of synthetic records with known parameters.
 
-The measure ``SyntheticFit`` computes a record from a scene, adds noise, and fits the record. The
-studies of fits use this measure to test confidence intervals and standard errors.
+The measure ``SyntheticFit`` computes a record from a scene, adds noise, and fits the record.
+Several studies use this measure to test confidence intervals and standard errors.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def protocol_axis(protocols: Mapping[str, str]) -> Axis:
     Parameters
     ----------
     protocols : mapping
-        Protocols by name.
+        Protocols, keyed by name.
 
     Returns
     -------
@@ -187,7 +187,7 @@ class SyntheticFit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Outputs for each parameter and for the quality of the fit."""
+        """Outputs of the measure, for each parameter and for the quality of the fit."""
         by = [
             Output(name, "", "1", text, dims=("parameter",), error=name == self.primary_output)
             for name, text in _PARAMETER_OUTPUTS
@@ -260,7 +260,7 @@ class SyntheticFit(Measure):
         smooth = integrator.tightened_to(1e-9)
 
         def friction(time: np.ndarray) -> np.ndarray:
-            """Return exact friction at given times."""
+            """Return the exact friction at given times."""
             begins = min(float(time[0]), 0.0)
             pieces = [
                 (begins, before.velocity, 1.0, 0.0),
@@ -381,7 +381,7 @@ class SyntheticFit(Measure):
         return JointModel(tuple(parts))
 
     def _expected_stderrs(self, truth: JointModel, true: ParameterValues) -> np.ndarray:
-        """Compute standard errors from the Fisher information, with the known noise."""
+        """Compute standard errors from the Fisher information and the known noise."""
         correlations = _correlations(self.process, self.rows)
         jacobian = truth.jacobian(true, self._free_parameters)
         information = np.zeros((len(self._free_parameters),) * 2)
@@ -438,7 +438,7 @@ def _build_rows(pieces: Sequence[_ProtocolSegment]) -> tuple[np.ndarray, np.ndar
 
 @lru_cache(maxsize=8)
 def _noise_factor(process: str, rows: int) -> np.ndarray:
-    """Return the matrix that converts white noise to the noise of a process."""
+    """Return the matrix that converts white noise to correlated noise of a process."""
     return np.asarray(np.linalg.cholesky(toeplitz(_correlations(process, rows))))
 
 

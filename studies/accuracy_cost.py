@@ -1,11 +1,12 @@
 """Accuracy and cost: measured error against work for several integrators.
 
 Several problems with answers that are known to 12 or more digits are solved with each integrator of
-SciPy and at several requested accuracies. Limit cycles are also solved with combinations of two
-integrators, one of which is used during ruptures. The error is measured against the known answer,
-and the work includes all right-hand-side evaluations. Processor times are relative to the time of
-DOP853 with 3 requested digits on the same problem. The two integrators are timed in alternation.
-The default settings of the package are based on this study.
+SciPy and at several requested accuracies. Limit cycles are also solved with pairs of integrators.
+One integrator of each pair is used between ruptures, and the other is used during ruptures. The
+error is the difference from the known answer, and the work is the total number of right-hand-side
+evaluations. Processor times are relative to the time of DOP853 with 3 requested digits on the same
+problem. Runs of the two integrators alternate, so that other processes on the machine affect both
+equally. The default settings of the package are based on this study.
 """
 
 import math
@@ -318,7 +319,7 @@ DEFAULT_INTEGRATOR = "DOP853"
 
 
 def plot_unreachable_accuracy(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the uncertainty of the known answer, and runs that failed.
+    """Draw the uncertainty of the known answer, and mark the failed runs.
 
     Failed runs are marked with crosses at the requested accuracy.
 
@@ -393,7 +394,7 @@ def proportionality_claim(label: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the slope of the achieved digits against the requested digits.
+        Claim about the slope of the achieved digits against the requested digits.
     """
     return Claim(
         id="A1",
@@ -422,7 +423,7 @@ def cheapest_claim(label: str, digits: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the work of the default integrator to the least work.
+        Claim about the ratio of the work of the default integrator to the least work.
     """
     return Claim.below(
         id="A2",

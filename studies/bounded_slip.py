@@ -2,10 +2,10 @@
 
 Under the slowness law and with k >= k_cr, the slip rate remains bounded after every velocity step,
 even without inertia. At constant normal stress and k = k_cr, the oscillations continue without
-decay. Peak slip rates can still be very high. After large steps, inertia limits the slip rate, and
-the motion with inertia departs from the quasi-static motion. At variable normal stress and k =
-k_cr, the motion with inertia and the quasi-static motion merge again after the largest steps. In
-all other cases, a difference in stress between the two motions remains.
+decay. Nevertheless, the peak slip rates can be very high. After large steps, inertia limits the
+slip rate, and the motion with inertia departs from the quasi-static motion. At variable normal
+stress and k = k_cr, the motion with inertia and the quasi-static motion merge again after the
+largest steps. In all other cases, a difference in stress between the two motions remains.
 """
 
 import math
@@ -40,9 +40,8 @@ _EXCLUDED_END_SHARE = 0.02
 class PathSeparation(Reduction):
     """Slip rates at which two paths separate and merge.
 
-    One path includes an additional effect, such as inertia, and the other path does not. The paths
-    separate on the branch that leads to the first peak of slip rate, and merge on the branch that
-    follows the peak.
+    One of the paths includes an additional effect, such as inertia. The paths separate while the
+    slip rate rises to its first peak, and merge while the slip rate decreases after this peak.
 
     Parameters
     ----------
@@ -272,7 +271,7 @@ def decaying_peaks_claim(
     Returns
     -------
     Claim
-        Claim on the ratio of the second peak to the first peak.
+        Claim about the ratio of the second peak to the first peak.
     """
     return Claim.below(
         id="C11",
@@ -305,7 +304,7 @@ def repeating_peaks_claim(rate: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the second peak to the first peak.
+        Claim about the ratio of the second peak to the first peak.
     """
     return Claim(
         id="C11",

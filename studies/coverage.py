@@ -1,13 +1,15 @@
 """Coverage of error estimates for random scenes.
 
-Scenes with random parameters from wide ranges are solved with both laws, constant and variable
-normal stress, and all kinds of dynamics. Each scene is solved twice: at the requested accuracy, and
-with a tolerance that is smaller by a factor of 100. The measured error is the difference between
-the two runs minus the error estimate of the more accurate run. The figure shows the ratio of the
-measured error to the error estimate of the first run. Use --set sample=0:49:50 for more scenes,
---set requested_digits=4,7,9 for other accuracies, and --set question for quantities that are
-measured in laboratory tests: rigid response, velocity step, healing, and (with --set
-normal_stress=imposed) normal stress transient and normal stress response.
+The study solves scenes whose parameters are drawn at random from wide ranges. The scenes include
+both laws, constant and variable normal stress, and all kinds of dynamics. Each scene is solved
+twice: at the requested accuracy, and with a tolerance that is smaller by a factor of 100. The
+measured error is the difference between the two results, reduced by the error estimate of the more
+accurate run. The figure shows the ratio of the measured error to the error estimate of the first
+run. For more scenes, use the option --set sample=0:49:50. For other accuracies, use the option
+--set requested_digits=4,7,9. To test quantities that are measured in laboratory tests, use the
+option --set question with the name of the test: rigid response, velocity step or healing. In
+combination with the option --set normal_stress=imposed, the tests normal stress transient and
+normal stress response are also available.
 """
 
 import math
@@ -60,10 +62,10 @@ _OUTPUTS = (
 class Coverage(Measure):
     """Ratios of errors to error estimates in a random scene.
 
-    The random scene has the law, normal stress condition and dynamics of a scene of the study. All
-    other parameters are drawn from wide ranges, with a fixed seed for each sample. The reference
-    results are computed with a tolerance that is smaller by a factor of 100, and the uncertainty of
-    the reference results is the error estimate of the reference run.
+    The law, normal stress condition and dynamics of the random scene are taken from the scene of
+    the cell. All other parameters are drawn from wide ranges, with a fixed seed for each sample.
+    The reference results are computed with a tolerance that is smaller by a factor of 100, and the
+    uncertainty of the reference results is the error estimate of the reference run.
 
     Parameters
     ----------
@@ -211,7 +213,7 @@ class CoverageStatistics(Reduction):
         Variable that contains the ratios of errors to error estimates, with NaN for missing
         results.
     by : tuple of str, optional
-        Dimensions over which the statistics are not combined.
+        Dimensions that the statistics keep. The statistics combine all other dimensions.
     """
 
     by: tuple[str, ...] = ()

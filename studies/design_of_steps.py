@@ -1,11 +1,12 @@
 """Expected standard errors of parameters for several designs of experiments.
 
 The Fisher information predicts the standard errors of an experiment before it is performed. The
-designs are steps up, steps back, holds and pairs of steps, on a stiff and on a compliant machine. A
-step up followed by a step back determines the exponent of the law seven times more accurately than
-two steps up. With a single step, a compliant machine determines the exponent five times more
-accurately than a stiff machine. The standard errors are halved if the record has four times as many
-rows, or if the noise is halved. Fits of synthetic records agree with the predicted standard errors.
+study compares designs with steps up, steps back, holds and pairs of steps, on a stiff and on a
+compliant machine. A step up followed by a step back determines the exponent of the law seven times
+more accurately than two steps up. With a single step, a compliant machine determines the exponent
+five times more accurately than a stiff machine. Halving the noise halves the standard errors, and
+so does recording four times as many rows. Fits of synthetic records agree with the predicted
+standard errors.
 """
 
 import xarray as xr
@@ -89,7 +90,7 @@ figure = Figure(
 
 
 def expected_error_claim(design: str, k: float, published: float) -> Claim:
-    """Return a claim on the expected standard error of the exponent (D1).
+    """Return a claim about the expected standard error of the exponent (D1).
 
     Parameters
     ----------
@@ -103,7 +104,7 @@ def expected_error_claim(design: str, k: float, published: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the expected standard error.
+        Claim about the expected standard error.
     """
     return Claim(
         id="D1",
@@ -138,7 +139,7 @@ def fit_error_claim(k: float, parameter: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the scatter of the estimates.
+        Claim about the scatter of the estimates.
     """
     return Claim(
         id="D2",

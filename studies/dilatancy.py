@@ -1,12 +1,12 @@
 """Critical stiffness of a dilatant fault as a function of drainage.
 
-If pores dilate with slip rate, pore pressure falls, and frictional strength rises until fluid flows
-into the pores. With fast drainage, the critical stiffness is (b - a) sigma_*/D_c, as without a
-fluid. Without drainage, the critical stiffness is (b - a - E) sigma_*/D_c, with E = mu_* eps/(beta
-sigma_*). If E exceeds b - a, the undrained fault is stable at every stiffness. Between these
-limits, the critical stiffness depends on how much fluid flows into the pores while the fault slips
-by D_c. Even at the strongest dilatancy, slow oscillations are unstable on a soft spring, because
-fluid has enough time to flow into the pores.
+If pores dilate when the slip rate increases, the pore pressure falls. The frictional strength then
+rises until fluid has flowed into the pores. With fast drainage, the critical stiffness is (b - a)
+sigma_*/D_c, as without a fluid. Without drainage, the critical stiffness is (b - a - E)
+sigma_*/D_c, with E = mu_* eps/(beta sigma_*). If E exceeds b - a, the undrained fault is stable at
+every stiffness. Between these limits, the critical stiffness depends on how much fluid flows into
+the pores while the fault slips by D_c. On a soft spring, slow oscillations are unstable even at the
+strongest dilatancy, because fluid has enough time to flow into the pores.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ def closed_form_claim(drainage: float, value: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the critical stiffness.
+        Claim about the critical stiffness.
     """
     return Claim(
         id="D1",
@@ -49,7 +49,7 @@ def closed_form_claim(drainage: float, value: float) -> Claim:
 def drainage_limit_claim(
     drainage: float, value: float, which: str, tolerance: float, reason: str
 ) -> Claim:
-    """Return a claim on the undrained or drained limit of k_cr (D2).
+    """Return a claim about the undrained or drained limit of k_cr (D2).
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def drainage_limit_claim(
     Returns
     -------
     Claim
-        Claim on the critical stiffness.
+        Claim about the critical stiffness.
     """
     return Claim(
         id="D2",
@@ -97,7 +97,7 @@ def growth_threshold_claim(dilatancy: float, drainage: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the difference from the closed form.
+        Claim about the difference from the closed form.
     """
     return Claim(
         id="D3",

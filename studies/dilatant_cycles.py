@@ -22,7 +22,7 @@ from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 def peak_slip_rate_claim(
     law: str, dilatancy: float, relation: str, log10: float, what: str
 ) -> Claim:
-    """Return a claim on the peak slip rate of a cycle at c* D_c/V_* = 1 (D7).
+    """Return a claim about the peak slip rate of a cycle at c* D_c/V_* = 1 (D7).
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def peak_slip_rate_claim(
     Returns
     -------
     Claim
-        Claim on the peak slip rate.
+        Claim about the peak slip rate.
     """
     return Claim(
         id="D7",

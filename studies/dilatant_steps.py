@@ -2,9 +2,9 @@
 
 The spring is stiffer than critical at all drainage rates, so steady sliding is stable, and only a
 step of load point velocity can trigger an instability. The critical step increases with dilatancy,
-in particular at slow drainage. On the way to instability, slip becomes much faster than drainage.
-The drainage that is necessary to reach the drained limit is therefore a hundred times faster than
-for steady sliding (see the study dilatancy).
+in particular at slow drainage. Before an instability, slip becomes much faster than drainage. The
+drained limit of the critical step is therefore reached only at a drainage rate that is a hundred
+times higher than for the stability of steady sliding (see the study dilatancy).
 """
 
 from typing import Any
@@ -28,7 +28,7 @@ FAULTS: dict[str, dict[str, str | float]] = {
 
 
 def stabilisation_claim(fault: str, drainage: float, by: float) -> Claim:
-    """Return the claim that dilatancy increases the critical step (D5).
+    """Return the claim that dilatancy increases the critical velocity step (D5).
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def stabilisation_claim(fault: str, drainage: float, by: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the difference of the critical steps.
+        Claim about the difference of the critical steps.
     """
     return Claim.above(
         id="D5",

@@ -3,11 +3,11 @@
 A slider in steady state at V_* is subjected to an instantaneous displacement of the load point. The
 load point is then held or continues to move at V_*. The critical step is the smallest step after
 which the slip rate reaches the instability norm. If the load point is held, the critical step under
-the slip law is D_c a/(b-a) at every stiffness. This value applies at constant normal stress and for
-a large instability norm. Variable normal stress changes this value very little. If the load point
-continues to move, the critical step is smaller, in particular for soft springs. Under the slowness
-law, the critical step is 1.7 to 8 times larger. On stiff springs, an instability under the slowness
-law occurs only if the slip rate reaches the instability norm during the step.
+the slip law is D_c a/(b-a) at every stiffness. This closed form applies at constant normal stress
+and for a large instability norm. Variable normal stress changes the critical step very little. If
+the load point continues to move, the critical step is smaller, in particular for soft springs.
+Under the slowness law, the critical step is 1.7 to 8 times larger. On stiff springs, an instability
+under the slowness law occurs only if the slip rate reaches the instability norm during the step.
 """
 
 from typing import Any
@@ -56,7 +56,7 @@ def closeness_claim(case: str, stiffness_ratio: float, tolerance: float, reason:
     Returns
     -------
     Claim
-        Claim on the slope of the critical step against a/(b-a).
+        Claim about the slope of the critical step against a/(b-a).
     """
     return Claim(
         id="C10",

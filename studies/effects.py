@@ -4,10 +4,10 @@ The study combines all normal stress conditions with all types of dynamics, for 
 k_cr. Without inertia and radiation damping, the slip rate is unbounded, except under the slowness
 law at variable normal stress, where it reaches 10^13 to 10^19 V_*. A cycle with radiation damping
 needs half as many right-hand-side evaluations as a cycle with inertia. However, a cycle with
-radiation damping has no overshoot, so the static stress drop is smaller by 25 to 50 %. An effect
-that is not part of the scene adds no unknowns and no computing time. The time of a right-hand-side
-evaluation is relative to the time for a quasi-static scene at constant normal stress. Each scene
-and this quasi-static scene are timed in alternation.
+radiation damping has no overshoot, so the static stress drop is smaller by 25 to 50 %. Effects that
+the scene does not include add no unknowns and no computing time. The time per right-hand-side
+evaluation is divided by the time for a quasi-static scene at constant normal stress. The timings of
+the two scenes alternate.
 """
 
 import math
@@ -94,8 +94,8 @@ class EffectCost(Measure):
 
     The number of unknowns and the time of a right-hand-side evaluation are reported separately for
     the equations between ruptures and during ruptures. The results also include the fraction of
-    evaluations during ruptures. Times are also reported relative to the simplest scene of the same
-    law, which is quasi-static with constant normal stress.
+    evaluations during ruptures. Times are also reported relative to the simplest scene with the
+    same law, which is quasi-static and has constant normal stress.
     """
 
     name: ClassVar[str] = "effect_cost"
@@ -257,7 +257,7 @@ def static_drop_loss_claim(law: str, dynamics: str, published: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the relative reduction.
+        Claim about the relative reduction.
     """
     return Claim.above(
         id="E1",

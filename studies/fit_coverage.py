@@ -1,14 +1,15 @@
 """Coverage of the confidence intervals of fits for many kinds of noise.
 
 Synthetic records of a velocity step from 1 to 10 um/s are fitted with the law that was used to
-compute them. The noise is white, autoregressive with a correlation of 0.9, or a moving average. If
-the standard errors account for the correlation of the noise (full markers), the intervals contain
-the exact parameters with the nominal probability. The usual formula assumes white noise (open
-markers), and its intervals contain the exact parameters far less often if the noise is correlated.
-Further kinds of noise imitate laboratory records: a noise level that changes, outliers, rounded
-friction, an uneven clock, displacement with jitter or from an encoder, and averaged friction. If
-friction is rounded too coarsely, or if friction was averaged without a corresponding option of the
-fit, the fit reports that the standard errors are not valid.
+compute them. The noise is white, autoregressive with a correlation of 0.9, or a moving average.
+Full markers show intervals whose standard errors account for the correlation of the noise. These
+intervals contain the exact parameters with the nominal probability. Open markers show intervals
+from the usual formula, which assumes white noise. If the noise is correlated, these intervals
+contain the exact parameters far less often. Other kinds of noise imitate imperfections of
+laboratory records, such as a changing noise level, outliers, rounded friction, an uneven clock,
+jitter or rounding of the displacement, and averaged friction. The fit reports that its standard
+errors are not valid if friction is rounded too coarsely, or if friction was averaged and the fit is
+not told about the averaging.
 """
 
 from collections.abc import Mapping
@@ -60,7 +61,7 @@ class ShareInside(Reduction):
         Name of the fraction. ``<name>_least`` is the difference between the smallest fraction of
         all parameters and the nominal coverage, in binomial standard deviations.
     of : str
-        Variable that is 1 inside the interval and 0 outside.
+        Variable that is 1 if the exact value lies inside the interval, and 0 otherwise.
     covers : float, optional
         Nominal coverage of the interval.
     """
@@ -163,7 +164,7 @@ shares_panel = Panel(
 
 
 def figure_height(dataset: xr.Dataset) -> float:
-    """Return the height of a panel for the number of kinds of noise.
+    """Return a panel height that is sufficient for all kinds of noise.
 
     Parameters
     ----------
@@ -193,7 +194,7 @@ def coverage_claims(series: str, words: str, **where: str) -> list[Claim]:
     Returns
     -------
     list of Claim
-        Claims on the coverage of the 68.3 % and 95.4 % intervals.
+        Claims about the coverage of the 68.3 % and 95.4 % intervals.
     """
     return [
         Claim.above(
@@ -225,7 +226,7 @@ def flagged_claim(process: str, law: str, least: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the fraction of records for which the fit reports invalid standard errors.
+        Claim about the fraction of records for which the fit reports invalid standard errors.
     """
     return Claim.above(
         id="F6",
@@ -251,7 +252,7 @@ def seldom_flagged_claim(process: str, law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the fraction of records for which the fit reports invalid standard errors.
+        Claim about the fraction of records for which the fit reports invalid standard errors.
     """
     return Claim.below(
         id="F7",
@@ -278,7 +279,7 @@ def naive_errors_claim(process: str, law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the coverage of the intervals of the usual formula.
+        Claim about the coverage of the intervals of the usual formula.
     """
     return Claim.below(
         id="F3",

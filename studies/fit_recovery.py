@@ -1,11 +1,11 @@
 """Recovery of known parameters from records without noise.
 
-Records without noise are computed for all laws with one state, and for a negative b. In further
-cases, the stiffness, alpha, the exponent of the law or the time of the step is a free parameter.
-Initial parameters of the fits differ from the exact values by 20 to 50 %. All fits recover the
-exact parameters, both for records that were computed with the model of the fit and for records that
-were computed from other equations with an integrator of SciPy. Dashed lines show the largest
-deviations that the claims allow.
+The study computes records without noise for all laws with one state variable, and for a negative
+value of b. In further cases, the stiffness, alpha, the exponent of the law or the time of the step
+is a free parameter. Initial parameters of the fits differ from the exact values by 20 to 50 %. All
+fits recover the exact parameters. Some records are computed with the model of the fit. To test this
+model, other records are computed from different equations with a SciPy integrator. Dashed lines
+show the maximum deviations that the claims permit.
 """
 
 import math
@@ -134,12 +134,12 @@ class RecoveryError(Measure):
         scene : Scene
             Parameters of the slider.
         values : mapping
-            Results by name.
+            Results, keyed by name.
 
         Returns
         -------
         mapping
-            Scale of the error of each result.
+            Error scale of each result.
         """
         return {"largest_deviation": 1.0}
 
@@ -308,7 +308,7 @@ CASES = {
 
 
 def plot_allowed_deviations(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the largest deviations that the claims allow.
+    """Draw lines at the maximum deviations that the claims permit.
 
     Parameters
     ----------
@@ -352,7 +352,7 @@ def recovery_claim(case: str, source: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the largest deviation.
+        Claim about the largest deviation.
     """
     reasons = {
         "the model": "termination of the fit, and rounding",

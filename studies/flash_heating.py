@@ -56,7 +56,7 @@ def stiffness_claim(rate: float, value: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the critical stiffness.
+        Claim about the critical stiffness.
     """
     where = {"weakening_velocity_ratio": 1e5, "load_velocity_ratio": rate}
     statement = f"V_w = 1e5 V_*, V = {rate:g} V_*: k_cr = {value:g} sigma_*/D_c"

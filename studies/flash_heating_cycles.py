@@ -4,9 +4,9 @@ With flash heating, the friction coefficient in a rupture decreases almost to th
 weakened contacts, f_w. For V_w = 10^5 V_*, the static stress drop increases from 0.07 sigma_*
 without flash heating to 0.87 (mu_* - f_w), and the recurrence interval increases in proportion to
 the stress drop. If the weakening velocity is ten times lower, the static stress drop is almost
-equal to mu_* - f_w. At the time of the highest slip rate, only a twentieth of the static stress
-drop has been released. The lattice also contains V_w = 10^9 V_*, for which flash heating has no
-effect.
+equal to mu_* - f_w. When the slip rate reaches its peak, only a twentieth of the static stress drop
+has been released. For comparison, the lattice also contains V_w = 10^9 V_*. This weakening velocity
+is so high that flash heating has no effect.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ def cycle_claim(variable: str, velocity: float, friction: float, value: float) -
     Returns
     -------
     Claim
-        Claim on the variable.
+        Claim about the variable.
     """
     where = {"weakening_velocity_ratio": velocity, "weakened_friction": friction}
     # The dynamic stress drop is a small difference, whose error estimate is 5e-7 of its value.

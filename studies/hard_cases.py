@@ -1,10 +1,10 @@
 """Hard cases for slider codes, with known results.
 
-The cases include slip rates from 10^-1745 to 10^87 V_*, stiffness that differs from the critical
-stiffness in the eighth digit, parameters at the ends of their ranges, masses from zero to very
-large values, and loading that friction cannot balance. If the result is a number, it must agree
-with an independent computation or a closed form to within its error estimate. If a case has no
-result, the computation must end with a status that describes the reason.
+The cases include slip rates from 10^-1745 to 10^87 V_*, a stiffness that differs from the critical
+stiffness only in the eighth digit, and parameters at the ends of their ranges. They also include
+masses from zero to very large values, and loading that friction cannot balance. If the result is a
+number, it must agree with an independent computation or a closed form to within its error estimate.
+If a case has no result, the computation must end with a status that describes the reason.
 """
 
 import math
@@ -185,7 +185,7 @@ def add_status_case(label: str, measure: Measure, status: Status, fields: Fields
 
 
 def add_critical_step_case(label: str, **fields: Any) -> None:
-    """Add a case with a critical step from the independent computation.
+    """Add a case whose critical step is known from an independent computation.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def add_critical_step_case(label: str, **fields: Any) -> None:
 
 
 def add_cycle_case(label: str, name: str, **fields: Any) -> None:
-    """Add a case with a limit cycle from the independent computation.
+    """Add a case whose limit cycle is known from an independent computation.
 
     Parameters
     ----------
@@ -385,7 +385,7 @@ add_status_case(
 
 
 def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
-    """Label the rows with the names of the cases.
+    """Label the rows of the figure with the names of the cases.
 
     Parameters
     ----------
@@ -423,7 +423,7 @@ def write_text(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
 def plot_errors(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw measured errors as filled markers, and error estimates as open markers.
 
-    Cases without an error are labelled with the name of the status or with the word "exact".
+    If a case has no error to plot, a label shows the name of its status or the word "exact".
 
     Parameters
     ----------

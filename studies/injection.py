@@ -5,10 +5,11 @@ fault is drained, or dilatant with pores that drain into the surroundings. Befor
 spring is slightly softer than critical. The critical stiffness decreases with effective normal
 stress. Small perturbations therefore stop growing when k exceeds the critical stiffness at the
 current pressure in the fault, and start to grow again when k falls below the critical stiffness.
-For both laws, this rule predicts the pore pressure at which perturbations stop or start to grow.
-The error of the predicted pressure is about the change of pressure within one or two D_c/V_*. While
-pressure rises, slip is faster, and the ratio of drainage to slip rate is smaller. On a dilatant
-fault, instability therefore ends at a lower pressure than the pressure at which it begins.
+For both laws, the comparison of k with the critical stiffness predicts the pore pressure at which
+perturbations stop or start to grow. The error of the prediction is about as large as the change of
+pressure during one or two D_c/V_*. While the pressure rises, slip is faster than V_0, so the ratio
+of drainage rate to slip rate is smaller. On a dilatant fault, the pressure at which perturbations
+stop growing is therefore lower than the pressure at which they start to grow again.
 """
 
 import math
@@ -346,7 +347,7 @@ def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of stiffness to critical stiffness.
+        Claim about the ratio of stiffness to critical stiffness.
     """
     return Claim(
         id="I1",
@@ -383,7 +384,7 @@ def critical_pressure_claim(at: str, law: str, case: str, within: float, reason:
     Returns
     -------
     Claim
-        Claim on the difference from the critical pressure at V_0.
+        Claim about the difference from the critical pressure at V_0.
     """
     where = {"law": law, "case": case, "record": SLOWEST_RECORD}
     return Claim(
@@ -482,7 +483,7 @@ def pressure_rates(row: xr.Dataset) -> xr.DataArray:
 
 
 def plot_one_to_one_line(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw a line at the pressure change within a time of D_c/V_*.
+    """Draw a line that shows the change of pressure during a time of D_c/V_*.
 
     Parameters
     ----------

@@ -1,9 +1,10 @@
 """Influence of the instability norm on critical steps.
 
-A motion is considered unstable when V T/(2 pi D_c) reaches a norm that the paper does not specify.
-Two critical velocities that the paper reports for the slowness law imply the same norm of 5e-4.
-Under the slip law, the norm is important if b - a is small compared to a: at a/(b-a) = 4, the
-critical load point velocity is 4.66 V_* for a norm of 5e-4, and 5 V_* for an infinite norm.
+A motion is considered unstable when V T/(2 pi D_c) reaches the instability norm. The paper does not
+specify the value of this norm. The paper reports two critical velocities for the slowness law, and
+both imply a norm of 5e-4. Under the slip law, the norm is important if b - a is small compared to
+a: at a/(b-a) = 4, the critical load point velocity is 4.66 V_* for a norm of 5e-4, and 5 V_* for an
+infinite norm.
 """
 
 import math

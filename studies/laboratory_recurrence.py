@@ -1,14 +1,16 @@
 """Recurrence of laboratory earthquakes in the model of Gualandi et al. (2023).
 
 Pores close when the slip rate increases. Without noise, all recurrence intervals are equal at ten
-of the twelve normal stresses of the experiments. At 17.003 and 20.002 MPa, the cycle of one event
-is unstable, and long and short intervals alternate, so the coefficient of variation (CV) of the
-intervals is 10 % and 20 %. The motion is periodic, with two events per period.
+of the twelve normal stresses of the experiments. At 17.003 and 20.002 MPa, the cycle with one event
+per period is unstable, and long and short intervals alternate. The coefficient of variation (CV) of
+the intervals is 10 % and 20 % at these normal stresses. The motion is periodic, with two events per
+period.
 
-White noise of the shear stress scatters the intervals at all normal stresses. The CV differs from
-that of the stochastic model of Gualandi et al., because their noise also acts on the state variable
-and on the normal stress. In their model, shear stress and normal stress fluctuate at constant slip
-rate, so the state variable takes up the noise. In this study, the slip rate takes up the noise.
+White noise in the shear stress causes scatter of the intervals at all normal stresses. The CV
+differs from the CV of the stochastic model of Gualandi et al., because the noise in their model
+also acts on the state variable and on the normal stress. In their model, stress fluctuates at
+constant slip rate, so the state variable changes with the noise. In this study, the slip rate
+changes with the noise instead.
 """
 
 from collections.abc import Sequence
@@ -66,7 +68,7 @@ def experiment_name(normal_stress: float, noise: str) -> str:
 
 
 def interval_cv_claim(normal_stress: float, variation: float, tolerance: float) -> Claim:
-    """Return a claim on the CV of alternating intervals (L1).
+    """Return a claim about the CV of alternating intervals (L1).
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ def interval_cv_claim(normal_stress: float, variation: float, tolerance: float) 
     Returns
     -------
     Claim
-        Claim on the CV of the intervals without noise.
+        Claim about the CV of the intervals without noise.
     """
     return Claim(
         id="L1",
@@ -105,7 +107,7 @@ def equal_intervals_claim(normal_stress: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the CV of the intervals without noise.
+        Claim about the CV of the intervals without noise.
     """
     return Claim.below(
         id="L2",

@@ -40,7 +40,7 @@ DECISIVE_AIC_DIFFERENCE = 4.0
 
 @dataclass(frozen=True)
 class LawChoiceShares(Reduction):
-    """Fractions of records with a correct, wrong or open choice of the law.
+    """Fractions of records for which the chosen law is correct, wrong or undecided.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class LawChoiceShares(Reduction):
 
 
 def plot_shares(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw bars with the fractions of correct, open and wrong choices.
+    """Draw bars with the fractions of correct, undecided and wrong choices.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def all_records_decide_claim(law: str, design: str, size: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the fraction of correct choices.
+        Claim about the fraction of correct choices.
     """
     return Claim(
         id="L1",
@@ -164,7 +164,7 @@ def seldom_wrong_claim(law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the fraction of wrong choices.
+        Claim about the fraction of wrong choices.
     """
     return Claim.below(
         id="L2",

@@ -3,9 +3,9 @@
 The records contain tenfold velocity steps with white noise, which has a standard deviation of 5e-4.
 Each window has separate values of initial friction and trend. The exponent is 0 for the slip law
 and 1 for the slowness law. A single step up determines the exponent poorly, because a change of the
-slip distance has a similar effect on friction. A second step up reduces the standard error only as
-much as repeating the first step. A step up followed by a step back determines the exponent ten
-times more accurately.
+slip distance has a similar effect on friction. A second step up reduces the standard error no more
+than a repetition of the first step would. A step up followed by a step back determines the exponent
+ten times more accurately.
 """
 
 import math
@@ -99,7 +99,7 @@ class ScatterRatio(Reduction):
         Returns
         -------
         Derivatives
-            Derivatives by result and variable.
+            Derivatives, keyed by result and variable.
         """
         over = dataset[self.of] / dataset["promised_spread"] ** 2
         return [(over / (self._record_dimensions(dataset) * self(dataset)[self.name]), {})]
@@ -153,7 +153,7 @@ figure = Figure(
 
 
 def design_claims(design: str) -> list[Claim]:
-    """Return the claims on the standard error of a design (I1 and I2).
+    """Return the claims about the standard error of a design (I1 and I2).
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def design_claims(design: str) -> list[Claim]:
     Returns
     -------
     list of Claim
-        Claims on the expected standard error, and on the scatter of the estimates.
+        Claims about the expected standard error and about the scatter of the estimates.
     """
     where = {"design": design, "parameter": "law_exponent"}
     return [

@@ -1,16 +1,16 @@
 """Influence of the evolution law on the critical displacement step.
 
 The load point is displaced instantaneously and then held. If the evolution of a law depends only on
-Theta/b + ln V, the critical step at constant normal stress has a closed form, h(u*) = -k/k_cr. The
-exponent eps connects the slip law (eps = 0) with the slowness law (eps = 1). For eps > 0, the
-critical step increases with stiffness and does not exist if eps k >= k_cr. On such stiff springs,
-an instability occurs only if the slip rate reaches the instability norm during the step. Some laws
-evolve faster than the slip law far from steady sliding. These laws have smaller critical steps than
-the slip law, in particular on stiff springs. Variable normal stress has little influence on the
-critical step under the slip law (Fig. 7 of the paper) and under similar laws. Variable normal
-stress has a larger influence under the slowness law and under a law with a cut-off velocity. The
-composite law has V_c = 100 V_*, and the cut-off velocity is 10^4 V_*. The instability norm of 1e6
-is so high that closed forms for an infinite norm apply.
+Theta/b + ln V, the critical step at constant normal stress has a closed form, h(u*) = -k/k_cr. In
+the family of laws with the exponent eps, eps = 0 is the slip law and eps = 1 is the slowness law.
+For eps > 0, the critical step increases with stiffness and does not exist if eps k >= k_cr. On such
+stiff springs, an instability occurs only if the slip rate reaches the instability norm during the
+step. Some laws evolve faster than the slip law far from steady sliding. These laws have smaller
+critical steps than the slip law, in particular on stiff springs. Variable normal stress has little
+influence on the critical step under the slip law (Fig. 7 of the paper) and under similar laws.
+Variable normal stress has a larger influence under the slowness law and under a law with a cut-off
+velocity. The composite law has V_c = 100 V_*, and the cut-off velocity is 10^4 V_*. The instability
+norm is 1e6, which is high enough for the closed forms of an infinite norm.
 """
 
 import math
@@ -45,7 +45,7 @@ CRITICAL_STIFFNESS_FIELDS = {"normal_stress": "constant", "stiffness_ratio": 1.0
 
 
 def critical_stiffness_claim(law: str, published: float, source: str) -> Claim:
-    """Return a claim on the critical stiffness of a law (L1).
+    """Return a claim about the critical stiffness of a law (L1).
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def critical_stiffness_claim(law: str, published: float, source: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the critical stiffness.
+        Claim about the critical stiffness.
     """
     return Claim(
         id="L1",
@@ -95,7 +95,7 @@ def critical_displacement_claim(
     Returns
     -------
     Claim
-        Claim on the critical displacement.
+        Claim about the critical displacement.
     """
     return Claim(
         id=id_,
@@ -111,7 +111,7 @@ def critical_displacement_claim(
 
 
 def variable_normal_stress_claim(law: str, published: float) -> Claim:
-    """Return a claim on the influence of variable normal stress (L4).
+    """Return a claim about the influence of variable normal stress (L4).
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def variable_normal_stress_claim(law: str, published: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the relative change.
+        Claim about the relative change.
     """
     return Claim(
         id="L4",

@@ -3,11 +3,11 @@
 Limit cycles with inertia are computed for all laws at four load point velocities. At constant
 normal stress, the dynamic stress drop decreases for all laws by about (b-a) sigma_* if ln V_0
 increases by 1. The static stress drop decreases by 2.1 (b-a) sigma_* under the slip law, and by 1.5
-(b-a) sigma_* under the slowness law. The minimum slip rate depends most strongly on the law, and
-ranges from 10^-1.4 V_* (slip law) to 10^-19 V_* (Perrin-Rice-Zheng law). Variable normal stress
-lowers the minimum slip rate by ten decades under the slip law, but not under the slowness law. The
-composite law has V_c = 100 V_*. The cut-off velocity of 10^4 V_* limits the slip rate to 10^5.4 V_*
-and makes the stress drops small.
+(b-a) sigma_* under the slowness law. Of all results, the minimum slip rate depends most strongly on
+the law. It ranges from 10^-1.4 V_* (slip law) to 10^-19 V_* (Perrin-Rice-Zheng law). Variable
+normal stress lowers the minimum slip rate by ten decades under the slip law, but not under the
+slowness law. The composite law has V_c = 100 V_*. The cut-off velocity of 10^4 V_* limits the slip
+rate to 10^5.4 V_* and makes the stress drops small.
 """
 
 from rsfstudy import Axis, Claim, Figure, Scene, Study
@@ -45,7 +45,7 @@ def known_cycle_claim(law: str, variable: str, published: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the variable.
+        Claim about the variable.
     """
     return Claim(
         id="L9",
@@ -72,7 +72,7 @@ def dynamic_drop_claim(law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the scaled slope.
+        Claim about the scaled slope.
     """
     return Claim(
         id="L10",
@@ -88,7 +88,7 @@ def dynamic_drop_claim(law: str) -> Claim:
 
 
 def slip_rate_claim(law: str, relation: str, decades: float) -> Claim:
-    """Return a claim on the minimum slip rate at variable normal stress (L11).
+    """Return a claim about the minimum slip rate at variable normal stress (L11).
 
     The paper reports a decrease of ten decades for the slip law.
 
@@ -104,7 +104,7 @@ def slip_rate_claim(law: str, relation: str, decades: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the change of the minimum slip rate.
+        Claim about the change of the minimum slip rate.
     """
     return Claim(
         id="L11",

@@ -5,9 +5,9 @@ steady sliding. At 1.25 k_cr and constant normal stress, the critical step range
 (Perrin-Rice-Zheng) and 2.6 V_* (slip) to 53 V_* (slowness) and 146 V_* (slowness with a cut-off
 velocity of 10^4 V_*). At 2 k_cr, the critical step ranges from 3.4 V_* to 4700 V_*. Close to the
 critical stiffness, variable normal stress lowers the critical step for all laws, as the paper
-reports for the slip law. For the slowness law, with and without a dependence on stress rate (c =
-1), this effect disappears at a stiffness between 1.5 k_cr and 1.9 k_cr. The composite law has V_c =
-100 V_*.
+reports for the slip law. For the slowness law, this effect disappears at a stiffness between 1.5
+k_cr and 1.9 k_cr, both with a dependence on stress rate (c = 1) and without it. The composite law
+has V_c = 100 V_*.
 """
 
 import numpy as np
@@ -33,9 +33,9 @@ STIFF_FIELDS = {"normal_stress": "constant", "stiffness_ratio": 1.25}
 
 
 def law_order_claim(smaller: str, larger: str) -> Claim:
-    """Return a claim on the order of the critical steps of two laws (L5).
+    """Return a claim about the order of the critical steps of two laws (L5).
 
-    The law with the faster evolution above steady sliding has the smaller critical step.
+    The law whose state evolves faster above steady sliding has the smaller critical step.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def law_order_claim(smaller: str, larger: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the difference of the critical steps.
+        Claim about the difference of the critical steps.
     """
     return Claim.above(
         id="L5",
@@ -73,7 +73,7 @@ def variable_normal_stress_claim(law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the relative change of the critical step.
+        Claim about the relative change of the critical step.
     """
     return Claim.above(
         id="L6",

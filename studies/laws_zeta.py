@@ -5,8 +5,8 @@ A family of laws with the exponent eps connects the slip law (eps = 0) with the 
 eps)(b-a)], so zeta = 1/(1 - eps). Eq. 10 of the paper is the special case eps = 0. Under the
 slowness law, no velocity step triggers an instability if the instability norm is arbitrarily large.
 Variable normal stress lowers zeta. Close to the slowness law, the critical step disappears at
-variable normal stress, because k_cr decreases with V_0. The instability norm of 1e6 is so high that
-the closed form for an infinite norm applies.
+variable normal stress, because k_cr decreases with V_0. The instability norm is 1e6, which is high
+enough for the closed form of an infinite norm.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ def zeta_claim(exponent: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on zeta at constant normal stress.
+        Claim about zeta at constant normal stress.
     """
     return Claim(
         id="L7",
@@ -59,7 +59,7 @@ def variable_normal_stress_claim(exponent: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the difference of zeta.
+        Claim about the difference of zeta.
     """
     return Claim.below(
         id="L8",

@@ -42,7 +42,7 @@ def cycle_place(law: str, normal_stress: str) -> dict[str, str]:
     Returns
     -------
     dict
-        Coordinates of the lattice.
+        Coordinates of the lattice cell.
     """
     return {"law": law, "normal_stress": normal_stress}
 
@@ -88,9 +88,9 @@ def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
 def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw stress against slip rate, with lines of steady and constant state.
 
-    The steady lines are drawn once for each coupling of normal stress and shear stress. If there
-    are more than two couplings, the lines of constant state are drawn only for the first coupling,
-    because the lines of all couplings would cover each other.
+    The relation between normal stress and shear stress may differ between cells. The line of steady
+    sliding is drawn once for each relation. If there are more than two relations, the lines of
+    constant state are drawn only for the first one, because too many lines would overlap.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _axes_fractions(axes: Axes, x: Any, y: Any) -> np.ndarray:
 def _label_line(
     axes: Axes, line: np.ndarray, number: str, colour: str, taken: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """Label a line where it is visible and far from other points.
+    """Place the label of a line where it is visible and far from other points.
 
     Parameters
     ----------

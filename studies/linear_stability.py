@@ -48,7 +48,7 @@ def growth_threshold_claim(mass: str, phi: float, rate: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the difference from the closed form.
+        Claim about the difference from the closed form.
     """
     return Claim(
         id="C1",
@@ -75,7 +75,7 @@ def steepness_claim(phi: float, gentler: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the difference of the slopes.
+        Claim about the difference of the slopes.
     """
     return Claim.below(
         id="C1",
@@ -140,7 +140,7 @@ def plot_slowest_steady_rate(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def angle_label(row: xr.Dataset) -> str:
-    """Return the driving angle and the slip rate that stabilises a spring.
+    """Return a label with the driving angle and the slip rate of stabilisation.
 
     The stiffness of the spring is 0.8 k_cr(V_*).
 

@@ -1,12 +1,12 @@
-"""Coefficient of variation of the recurrence interval against the amplitude of noise.
+"""Coefficient of variation of recurrence intervals against noise amplitude.
 
-White noise of the shear stress scatters the recurrence intervals of a slider that would otherwise
-repeat exactly. For weak noise, the coefficient of variation (CV) follows from the phase response of
-the limit cycle, which is a property of the motion without noise. The CV of simulated intervals
-agrees with this theory to within 1.5 % and the sampling error for amplitudes up to
-3e-4 sigma_* per sqrt(D_c/V_*). At 1e-3, the CV is larger than in the theory, because the
-distribution of the intervals has a long tail. If noise only changed the reloading between the
-events, the CV would be 14 % lower.
+White noise in the shear stress causes scatter of the recurrence intervals, which would otherwise be
+equal. For weak noise, the coefficient of variation (CV) follows from the phase response of the
+limit cycle, which is a property of the motion without noise. For amplitudes up to 3e-4 sigma_* per
+sqrt(D_c/V_*), the CV of simulated intervals differs from this theory by at most 1.5 % plus the
+sampling error. At an amplitude of 1e-3, the CV is larger than predicted, because the distribution
+of the intervals has a long tail. If noise affected only the reloading between events, the CV would
+be 14 % lower.
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ LIMIT_CYCLE_INTERVAL = 27.9378083295
 
 @dataclass(frozen=True)
 class TheoryDeviation(Reduction):
-    """Deviation of the mean CV from the theory, relative to the permitted deviation.
+    """Deviation of the mean CV from the theory, divided by the permitted value.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class TheoryDeviation(Reduction):
         Returns
         -------
         xarray.Dataset
-            Magnitude of the deviation, relative to the permitted deviation.
+            Absolute deviation divided by the permitted deviation, for each amplitude.
         """
         theory = dataset["interval_cv_theory"].mean("sample")
         stderr = np.sqrt(
@@ -88,7 +88,7 @@ def cv_claim(amplitude: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the mean CV of all seeds.
+        Claim about the mean CV of all seeds.
     """
     return Claim.below(
         id="N1",
@@ -118,7 +118,7 @@ def theory_claim(variable: str, value: float, statement: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the variable.
+        Claim about the variable.
     """
     return Claim(
         id="N2",

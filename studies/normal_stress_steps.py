@@ -1,12 +1,12 @@
 """Estimates of alpha and D_c from steps of normal stress.
 
 Imposed normal stress changes by a step while the load point continues to move at V_*, and friction
-is recorded over 20 D_c. As in the experiments of Linker and Dieterich (1992), an exponential
-function is fitted to the transient and extrapolated to the time of the step, which gives estimates
-of alpha and D_c. Under the slip law, both estimates are correct on a stiff machine. Under the
-slowness law, alpha is too small for steps up and too large for steps down, even on a very stiff
-machine. On a compliant machine, considerable slip occurs before the spring has followed the change
-of strength, so the estimates depend on the machine as much as on the fault.
+is recorded over 20 D_c. An exponential function is fitted to the transient and extrapolated to the
+time of the step, as in the experiments of Linker and Dieterich (1992). The fitted function gives
+estimates of alpha and D_c. Under the slip law, both estimates are correct on a stiff machine. Under
+the slowness law, alpha is too small for steps up and too large for steps down, even on a very stiff
+machine. On a compliant machine, considerable slip occurs before the spring stress has adjusted to
+the change of strength. The estimates therefore depend on the machine as much as on the fault.
 """
 
 import math
@@ -57,11 +57,11 @@ def remaining_transient(law: str, step: float, ratio: float, slip: float) -> flo
     Let :math:`r` be one plus the step of normal stress, and :math:`\delta` the slip in :math:`D_c`.
     The transient of a rigid slider is :math:`-\alpha \ln r \, e^{-\delta}` under the slip law.
     Under the slowness law, the transient is :math:`b \ln(1 + y)` with
-    :math:`y = (r^{-\alpha/b} - 1)\,e^{-\delta}`. The finite stiffness :math:`K` has
-    two effects. While the spring follows the change of strength, ln V returns to zero over a slip
-    of approximately :math:`a r/K`, and the evolution of the state differs from the evolution at
-    :math:`V_*`. Later, the slip rate differs from the velocity of the load point while friction
-    changes.
+    :math:`y = (r^{-\alpha/b} - 1)\,e^{-\delta}`. The finite stiffness :math:`K` of the machine has
+    two effects on the transient. While the spring follows the change of strength, ln V returns to
+    zero over a slip of approximately :math:`a r/K`, and the evolution of the state differs from the
+    evolution at :math:`V_*`. Later, while friction changes, the slip rate differs from the load
+    point velocity.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def expected_readings(law: str, step: float, ratio: float = math.inf) -> tuple[f
 
 
 def rigid_limit_claim(law: str, step: float) -> Claim:
-    """Return a claim on the estimate of alpha on a stiff machine (R5).
+    """Return a claim about the estimate of alpha on a stiff machine (R5).
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def rigid_limit_claim(law: str, step: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the estimate.
+        Claim about the estimate.
     """
     read, rigid = expected_readings(law, step, STIFFEST)[0], expected_readings(law, step)[0]
     return Claim(
@@ -151,7 +151,7 @@ def rigid_limit_claim(law: str, step: float) -> Claim:
 
 
 def slip_distance_claim(law: str, step: float) -> Claim:
-    """Return a claim on the estimate of D_c on a stiff machine (R6).
+    """Return a claim about the estimate of D_c on a stiff machine (R6).
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def slip_distance_claim(law: str, step: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the estimate.
+        Claim about the estimate.
     """
     read, rigid = expected_readings(law, step, STIFFEST)[1], expected_readings(law, step)[1]
     quicker = initial_log_rate(step) if law == "slip" else -initial_log_rate(step)
@@ -196,7 +196,7 @@ def direct_change_claim(law: str, step: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the immediate change of friction.
+        Claim about the immediate change of friction.
     """
     return Claim(
         id="R7",

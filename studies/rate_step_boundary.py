@@ -2,10 +2,10 @@
 
 The load point velocity of a slider in steady state at V_* changes to V_0. The critical step is the
 smallest V_0 for which the slip rate reaches the instability norm. The figure shows the critical
-step for constant normal stress, and for normal stress that varies with shear stress. The function
-V_0/V_* = 1 + zeta a/(b-a) is fitted for a/(b-a) from 0.25 to 1. At larger values of a/(b-a), the
-finite instability norm lowers the critical step below the line V_0/V_* = 1 + a/(b-a), even at
-constant normal stress.
+step for constant normal stress, and for normal stress that varies with shear stress. The parameter
+zeta of the function V_0/V_* = 1 + zeta a/(b-a) is fitted to the critical steps at a/(b-a) from 0.25
+to 1. At larger values of a/(b-a), the finite instability norm lowers the critical step below the
+line V_0/V_* = 1 + a/(b-a), even at constant normal stress.
 """
 
 import numpy as np
@@ -89,7 +89,7 @@ figure = Figure(
 
 
 def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
-    """Return a claim on the effect of variable normal stress (C7).
+    """Return a claim about the effect of variable normal stress (C7).
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the relative reduction.
+        Claim about the relative reduction.
     """
     return Claim(
         id="C7",

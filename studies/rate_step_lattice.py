@@ -20,7 +20,7 @@ from ._paper import CONSTANT_NORMAL_STRESS, NORMAL_STRESS_CASES, PAPER, REFERENC
 
 
 def plot_cells(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the boundary, stable cells (open markers) and unstable cells (filled).
+    """Draw the boundary, and mark stable cells (open) and unstable cells (filled).
 
     Parameters
     ----------

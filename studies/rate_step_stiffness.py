@@ -1,10 +1,11 @@
 """Critical velocity step against stiffness (Fig. 6 and section 4).
 
-The critical step of load point velocity at b/a = e increases with stiffness, approximately
-exponentially for the slip law. The critical step is much larger for the slowness law. Eq. 11 of the
-paper, V_0/V_* = exp(k/k_cr)/lambda, is exact only at k = k_cr. At larger stiffness, the critical
-step is up to 2.4 % smaller. The study rate_step_lattice finds the same critical step from stable
-and unstable cells, and the study instability_norm shows the influence of the instability norm.
+The critical step of load point velocity is computed for b/a = e. It increases with stiffness, and
+the increase is approximately exponential for the slip law. The critical step is much larger for the
+slowness law. Eq. 11 of the paper, V_0/V_* = exp(k/k_cr)/lambda, is exact only at k = k_cr. At
+larger stiffness, the critical step is up to 2.4 % smaller. The study rate_step_lattice finds the
+same critical step from stable and unstable cells, and the study instability_norm shows the
+influence of the instability norm.
 """
 
 import math
@@ -32,7 +33,7 @@ from ._paper import (
 def section_4_claim(
     stiffness_ratio: float, published: float, tolerance: float, digits: str
 ) -> Claim:
-    """Return a claim on a critical step of section 4 (C17).
+    """Return a claim about a critical step of section 4 (C17).
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def section_4_claim(
     Returns
     -------
     Claim
-        Claim on the critical step.
+        Claim about the critical step.
     """
     return Claim(
         id="C17",
@@ -67,7 +68,7 @@ def section_4_claim(
 
 
 def eq_11_claim(stiffness_ratio: float, published: float, tolerance: float, reason: str) -> Claim:
-    """Return a claim on the ratio of the critical step to eq. 11 (C8).
+    """Return a claim about the ratio of the critical step to eq. 11 (C8).
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def eq_11_claim(stiffness_ratio: float, published: float, tolerance: float, reas
     Returns
     -------
     Claim
-        Claim on the ratio at constant normal stress.
+        Claim about the ratio at constant normal stress.
     """
     return Claim(
         id="C8",

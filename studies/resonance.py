@@ -1,9 +1,9 @@
 """Response of spring stress to oscillating normal stress.
 
 Imposed normal stress oscillates during steady sliding, and spring stress oscillates with the same
-period. If the stiffness approaches the critical stiffness, small oscillations have a resonance at
-the period 2 pi sqrt(a/(b - a)) D_c/V under both laws. If the stiffness is closer to critical,
-linear theory fails at a smaller amplitude.
+period. Close to the critical stiffness, small oscillations have a resonance at the period 2 pi
+sqrt(a/(b - a)) D_c/V under both laws. The amplitude above which linear theory fails decreases as
+the stiffness approaches the critical stiffness.
 """
 
 import math
@@ -97,7 +97,7 @@ def linear_limit_claim(law: str, ratio: float, period: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the gain.
+        Claim about the gain.
     """
     gain = linear_gain(ratio, period)
     return Claim(
@@ -132,7 +132,7 @@ def resonance_claim(law: str, period: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the difference of the gains at the two periods.
+        Claim about the difference of the gains at the two periods.
     """
     at = {
         "law": law,
@@ -156,7 +156,7 @@ def resonance_claim(law: str, period: float) -> Claim:
 
 
 def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Claim:
-    """Return a claim on the validity of linear theory at an amplitude (R3).
+    """Return a claim about the validity of linear theory (R3).
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool 
     Returns
     -------
     Claim
-        Claim on the relative difference from linear theory.
+        Claim about the relative difference from linear theory.
     """
     return Claim(
         id="R3",
@@ -192,7 +192,7 @@ def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool 
 
 
 def failure_order_claim(softer: float, stiffer: float) -> Claim:
-    """Return a claim on the amplitudes at which linear theory fails (R4).
+    """Return a claim about the amplitudes at which linear theory fails (R4).
 
     Linear theory fails at a smaller amplitude on the softer spring.
 
@@ -206,7 +206,7 @@ def failure_order_claim(softer: float, stiffer: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the difference of the amplitudes at which linear theory fails.
+        Claim about the difference of the amplitudes at which linear theory fails.
     """
     at = {"law": "slowness", "oscillation_period": RESONANCE_PERIOD}
     return Claim.below(

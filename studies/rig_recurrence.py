@@ -4,8 +4,9 @@ The figures show the recurrence interval in s and the static stress drop in MPa 
 velocity in um/s at three normal stresses. The stiffness of the machine is 0.4, 0.2 and 0.1 of the
 critical stiffness at 5, 10 and 20 MPa. Stress drops decrease with the logarithm of load point
 velocity by slightly more than 2 (b-a) sigma. One half of this decrease is due to friction, and the
-other half is due to overshoot. The recurrence interval is slightly longer than the time in which
-the spring is loaded by the stress drop (lines), because the slider creeps during this time.
+other half is due to overshoot. Lines show the time in which the load point restores the stress drop
+if the slider is at rest. The recurrence interval is slightly longer, because the slider creeps
+during this time.
 """
 
 from dataclasses import replace
@@ -39,7 +40,7 @@ TOLERANCE_REASON = (
 
 
 def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
-    """Return a claim on the slope of a stress drop under the slip law (S1).
+    """Return a claim about the slope of a stress drop under the slip law (S1).
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the slope against ln V_0.
+        Claim about the slope against ln V_0.
     """
     return Claim(
         id="S1",
@@ -71,7 +72,7 @@ def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
 
 
 def slowness_law_drop_claim(stress: float) -> Claim:
-    """Return a claim on the static drop under the slowness law (S2).
+    """Return a claim about the static drop under the slowness law (S2).
 
     The static drop decreases by more than 2 (b-a) sigma if ln V_0 increases by 1, because the state
     increases throughout the interval between events.
@@ -84,7 +85,7 @@ def slowness_law_drop_claim(stress: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the slope against ln V_0.
+        Claim about the slope against ln V_0.
     """
     return Claim.below(
         id="S2",
@@ -97,7 +98,7 @@ def slowness_law_drop_claim(stress: float) -> Claim:
 
 
 def loading_time_line(row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the time in which the spring is loaded by the static stress drop.
+    """Return the time in which the load point restores the static stress drop.
 
     The slider is assumed to be at rest during this time.
 

@@ -40,7 +40,7 @@ def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Cl
     Returns
     -------
     Claim
-        Claim on the relative difference of the evolution distances.
+        Claim about the relative difference of the evolution distances.
     """
     return Claim.below(
         id=claim,

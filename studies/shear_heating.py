@@ -72,7 +72,7 @@ def transition_rate(cooling: float) -> float:
 
 
 def shown_cooling_rates(values: Sequence[float]) -> list[float]:
-    """Return the cooling rates whose curves of steady friction are shown.
+    """Return the cooling rates for which the figure shows the steady friction.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def stiffness_claim(cooling: float, value: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the critical stiffness.
+        Claim about the critical stiffness.
     """
     where = {"cooling": cooling, "load_velocity_ratio": 1.0}
     statement = f"C = {cooling:g}, V = V_*: k_cr = {value:g} sigma_*/D_c"
@@ -127,7 +127,7 @@ def stiffness_claim(cooling: float, value: float) -> Claim:
 
 
 def transition_claim(factor: float, change: str) -> Claim:
-    """Return a claim on the transition from weakening to strengthening (H9).
+    """Return a claim about the transition from weakening to strengthening (H9).
 
     Parameters
     ----------

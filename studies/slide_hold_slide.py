@@ -1,10 +1,11 @@
 """Healing and relaxation in slide-hold-slide tests.
 
-The load point is held after steady sliding at V_*, and then moves again at V_*. Under the slowness
-law with b > a, relaxation approaches a limit that depends on stiffness. Healing increases by b ln
-10 per decade of hold time at every stiffness. Without rate weakening, relaxation continues without
-limit. Under the slip law, relaxation continues without limit as well, and healing per decade
-decreases with stiffness. The measured values then depend on the machine as much as on the fault.
+After steady sliding at V_*, the load point stops for the hold time, and then moves at V_* again.
+Under the slowness law with b > a, relaxation approaches a limit that depends on stiffness. Healing
+increases by b ln 10 per decade of hold time at every stiffness. Without rate weakening, relaxation
+has no limit. Under the slip law, relaxation has no limit either, and the healing per decade
+decreases with stiffness. The values that are measured in such tests therefore depend on the machine
+as much as on the fault.
 """
 
 import math
@@ -33,7 +34,7 @@ CLOSED_FORM_SOURCE = "stationary contact in closed form: slowness law, quasi-sta
 
 
 def relaxation_claim(ratio: float) -> Claim:
-    """Return a claim on the limit of relaxation (P1).
+    """Return a claim about the limit of relaxation (P1).
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ def relaxation_claim(ratio: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on relaxation after the longest hold.
+        Claim about relaxation after the longest hold.
     """
     return Claim(
         id="P1",
@@ -58,7 +59,7 @@ def relaxation_claim(ratio: float) -> Claim:
 
 
 def reloading_peak_claim(ratio: float) -> Claim:
-    """Return a claim on the friction peak after a long hold (P3).
+    """Return a claim about the friction peak after a long hold (P3).
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def reloading_peak_claim(ratio: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on healing after the longest hold.
+        Claim about healing after the longest hold.
     """
     stiffness = ratio * a
     late = a * b * math.log(stiffness / b) / (stiffness - b)
@@ -99,7 +100,7 @@ def healing_claim(ratio: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the slope of healing.
+        Claim about the slope of healing.
     """
     return Claim(
         id="P4",

@@ -4,13 +4,14 @@ The map shows the final behaviour of a slider after the load point velocity chan
 steady sliding, damped oscillation, slow slip or stick-slip. Steady sliding occurs if linear theory
 predicts stability, and a limit cycle occurs in all other cases. A limit cycle is slow slip if its
 peak slip rate remains below the instability norm, and stick-slip otherwise. A motion settles by
-damped oscillation if the eigenvalues are a complex pair, which is the case up to about six times
-the critical stiffness. The critical stiffness at V_0, computed from the eigenvalues of steady
-sliding, bounds the region of limit cycles in every column of the map. At variable normal stress,
-this boundary decreases with V_0, and slow slip occurs in a narrow band below it. At constant normal
-stress, stick-slip occurs up to the boundary. Close to the boundary, motions approach their limit
-cycle slowly, over thousands of events, and small integration errors have large effects. The
-tolerance of the integration is therefore 300 times smaller than the requested accuracy.
+damped oscillation if the eigenvalues are a complex pair, which is the case at stiffnesses up to
+about six times the critical stiffness. The critical stiffness at V_0, computed from the eigenvalues
+of steady sliding, bounds the region of limit cycles in every column of the map. At variable normal
+stress, this boundary decreases with V_0, and slow slip occurs in a narrow band below it. At
+constant normal stress, stick-slip occurs up to the boundary. Close to the boundary, motions
+approach their limit cycle slowly, over thousands of events, and small integration errors have large
+effects. The tolerance of the integration is therefore 300 times smaller than the requested
+accuracy.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,7 +44,7 @@ class CycleRegionEdge(Reduction):
     """Stiffness at the boundary between limit cycles and steady sliding.
 
     The boundary lies between the stiffest cell with a limit cycle and the softest cell that settles
-    to steady sliding. The position of the boundary between these cells is not interpolated. The
+    to steady sliding. The position of the boundary is not interpolated between these two cells. The
     result is compared with the critical stiffness at :math:`V_0` from the eigenvalues of steady
     sliding with inertia. Both stiffnesses are relative to :math:`k_{cr}(V_*)`.
 
@@ -93,7 +94,7 @@ class CycleRegionEdge(Reduction):
         )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Find the bracket of the boundary along stiffness.
+        """Find the two stiffnesses between which the boundary lies.
 
         Parameters
         ----------
@@ -152,7 +153,7 @@ def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray 
     Parameters
     ----------
     places : xarray.DataArray
-        Array with the dimensions of the lattice except stiffness.
+        Array that has all dimensions of the lattice except the stiffness dimension.
     dataset : xarray.Dataset
         Results of the study.
 
@@ -185,7 +186,7 @@ STIFF_SPRINGS = (1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
 
 
 def spans_stiffness(softest: float, dataset: xr.Dataset) -> bool:
-    """Return True if some stiffness ratios lie below a limit and others above it.
+    """Return True if some stiffness ratios lie below a limit and others lie above it.
 
     Parameters
     ----------
@@ -319,7 +320,7 @@ MISPLACED_CELLS_CLAIM: dict[str, Any] = {
 
 
 def edge_claim(law: str, normal_stress: str, says: str, **held: Any) -> Claim:
-    """Return a claim on the boundary of limit cycles (C1).
+    """Return a claim about the boundary of limit cycles (C1).
 
     Parameters
     ----------
@@ -335,7 +336,7 @@ def edge_claim(law: str, normal_stress: str, says: str, **held: Any) -> Claim:
     Returns
     -------
     Claim
-        Claim on the boundary.
+        Claim about the boundary.
     """
     return Claim(
         id="C1",

@@ -2,11 +2,11 @@
 
 Stress drops of limit cycles decrease with the logarithm of load point velocity. Under the slip law
 and at constant normal stress, the slopes over three decades are close to 2 (a-b) sigma_* (static)
-and (a-b) sigma_* (dynamic). At variable normal stress, these values are divided by 1 - mu_*
-cot(phi). Under the slowness law, the slopes depend on stiffness. Separate fits at low and at high
-velocities show that the slope is not constant at variable normal stress. At phi = 50 degrees, k_cr
-decreases so much with V that stick-slip does not occur at high velocities. The fits ignore cells
-without stick-slip and report the number of points.
+and (a-b) sigma_* (dynamic). At variable normal stress, the slopes are close to these values divided
+by 1 - mu_* cot(phi). Under the slowness law, the slopes depend on stiffness. At variable normal
+stress, separate fits at low and at high velocities show that the slope depends on velocity. At phi
+= 50 degrees, k_cr decreases so much with V that stick-slip does not occur at high velocities. The
+fits ignore cells without stick-slip and report the number of points.
 """
 
 import math
@@ -43,7 +43,7 @@ def _normal_stress_term(case: str) -> str:
 
 
 def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law: str) -> Claim:
-    """Return a claim on a slope under the slip law at 0.8 k_cr (C15).
+    """Return a claim about a slope under the slip law at 0.8 k_cr (C15).
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law
     Returns
     -------
     Claim
-        Claim on the slope against ln V_0.
+        Claim about the slope against ln V_0.
     """
     return Claim(
         id="C15",
@@ -87,7 +87,7 @@ def slowness_law_drop_claim(case: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the slope of the static drop against ln V_0.
+        Claim about the slope of the static drop against ln V_0.
     """
     return Claim.below(
         id="C16",

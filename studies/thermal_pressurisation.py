@@ -1,11 +1,12 @@
 """Critical stiffness as a function of heating, cooling and drainage.
 
 Frictional heat raises the pore pressure, which weakens the fault until heat and fluid have flowed
-out. E is the undrained increase of pore pressure due to a slip of D_c at a friction coefficient of
-1. Without cooling and drainage, the critical stiffness is b - a + mu_* (mu_* + a) E in units of
-sigma_*/D_c, to first order in E. For E = 0.03, the critical stiffness is three times as high as
-without heating. If the fluid drains before the fault has slipped by a considerable fraction of D_c,
-the critical stiffness is b - a. Fast cooling with fast drainage even stabilises the fault slightly.
+out. The heating parameter E is the undrained increase of pore pressure due to a slip of D_c at a
+friction coefficient of 1. Without cooling and drainage, the critical stiffness is b - a + mu_*
+(mu_* + a) E in units of sigma_*/D_c, to first order in E. For E = 0.03, the critical stiffness is
+three times as high as without heating. If the fluid drains before the fault has slipped by a
+considerable fraction of D_c, the critical stiffness is b - a. Fast cooling with fast drainage even
+stabilises the fault slightly.
 """
 
 import numpy as np
@@ -79,7 +80,7 @@ def stiffness_claim(heating: float, cooling: float, drainage: float, value: floa
     Returns
     -------
     Claim
-        Claim on the critical stiffness.
+        Claim about the critical stiffness.
     """
     where = {"heating": heating, "cooling": cooling, "drainage": drainage}
     statement = (

@@ -1,12 +1,12 @@
 """Stick-slip cycles with thermal pressurisation.
 
-E is the undrained increase of pore pressure due to a slip of D_c at a friction coefficient of 1.
-The static stress drop increases with E. For small E, the stress drop is the same as for a drained
-fault. For E = 0.01, the pore pressure in a rupture removes most of the effective normal stress.
-With the slip law, the stress drop is then almost seven times as large as for a drained fault. After
-such a rupture, the fluid drains and the strength recovers, so the lowest slip rate of the cycle is
-several orders of magnitude lower. The test for a repeating cycle ignores the temperature, because
-the steady temperature at the slip rate of a rupture is extremely large.
+The heating parameter E is the undrained increase of pore pressure due to a slip of D_c at a
+friction coefficient of 1. The static stress drop increases with E. For small E, the stress drop is
+the same as for a drained fault. For E = 0.01, the pore pressure in a rupture removes most of the
+effective normal stress. With the slip law, the stress drop is then almost seven times as large as
+for a drained fault. After such a rupture, the fluid drains and the strength recovers, so the lowest
+slip rate of the cycle is several orders of magnitude lower. The test for a repeating cycle ignores
+the temperature, because the steady temperature at the slip rate of a rupture is extremely large.
 """
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
@@ -32,7 +32,7 @@ def cycle_claim(variable: str, law: str, heating: float, value: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the variable.
+        Claim about the variable.
     """
     statement = f"{law} law, E = {heating:g}: {variable.replace('_', ' ')}"
     where = {"law": law, "heating": heating}

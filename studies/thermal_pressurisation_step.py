@@ -51,7 +51,7 @@ def pressure_claim(heating: float, slip: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the effective normal stress.
+        Claim about the effective normal stress.
     """
     return Claim(
         id="H15",

@@ -2,20 +2,22 @@
 
 A slider is in steady state at V_*. Then normal stress decreases instantaneously or the load point
 is displaced, and the load point is held afterwards. Alternatively, the load point velocity
-increases. To first order in k/k_cr, a decrease of normal stress and a displacement step trigger an
-instability at the same change of Coulomb stress with mu' = mu_* - alpha (1 - a/b), for all laws.
-Under the slip law, this rule of equal Coulomb stress remains valid at larger stiffness: exactly for
-alpha = 0, and to within 3 % up to 2 k_cr, even for inclined driving. Under the slowness law, the
-rule of equal Coulomb stress fails close to the critical stiffness. The critical decrease of normal
-stress then needs up to 2.4 times the Coulomb stress change of a displacement step, because a
-decrease of normal stress also lowers the critical stiffness. On very stiff springs, an instability
-occurs only if the slip rate reaches the instability norm during the step. The rule of equal Coulomb
-stress fails on these springs as well. The effect of normal stress on the state makes decreases of
-normal stress less effective. The direct effect of the critical velocity step, a ln(V_0/V_*), is 0.6
-to 1.03 times the stress change of the critical displacement step. In most cases, the direct effect
-is smaller, because the load point continues to move. Below the critical stiffness, every velocity
-step triggers an instability. For inclined driving, the angle is 60 degrees, and the decrease of
-normal stress is a decrease of sigma_3.
+increases. The change of Coulomb stress is defined with the friction coefficient mu' = mu_* - alpha
+(1 - a/b). To first order in k/k_cr and for all laws, the critical decrease of normal stress and the
+critical displacement step cause the same change of Coulomb stress. Under the slip law, this rule of
+equal Coulomb stress also applies at larger stiffness. It is exact for alpha = 0, and accurate to
+within 3 % up to 2 k_cr for other values of alpha, even for inclined driving. Under the slowness
+law, the rule of equal Coulomb stress fails close to the critical stiffness. In this range, the
+Coulomb stress change of the critical decrease of normal stress is up to 2.4 times that of the
+critical displacement step, because a decrease of normal stress also lowers the critical stiffness.
+On very stiff springs, an instability occurs only if the slip rate reaches the instability norm
+during the step. The rule of equal Coulomb stress also fails on very stiff springs. If the state
+depends on normal stress, a larger decrease of normal stress is necessary to trigger an instability.
+The direct effect of the critical velocity step, a ln(V_0/V_*), is 0.6 to 1.03 times the stress
+change of the critical displacement step. In most cases, the direct effect is smaller than this
+stress change, because the load point continues to move after a velocity step. Below the critical
+stiffness, every velocity step triggers an instability. For inclined driving, the angle is 60
+degrees, and the decrease of normal stress is a decrease of sigma_3.
 
 The change of Coulomb stress is ``dtau - mu' dsigma``. A displacement d of the load point changes
 shear stress by K d, and normal stress by K d cot(phi). A step of imposed normal stress, or of
@@ -61,7 +63,7 @@ FRICTION_REDUCTION = base.mu_star - EFFECTIVE_FRICTION
 
 
 def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, reason: str) -> Claim:
-    """Return a claim on the critical decrease of normal stress (N1).
+    """Return a claim about the critical decrease of normal stress (N1).
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, rea
     Returns
     -------
     Claim
-        Claim on the critical step.
+        Claim about the critical step.
     """
     published = critical_normal_stress_step(
         base.mu_star, base.a, base.b_over_a, alpha, EXPONENTS[law], ratio
@@ -116,7 +118,7 @@ def coulomb_limit_claim(law: str, case: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the Coulomb stress changes at 0.05 k_cr.
+        Claim about the ratio of the Coulomb stress changes at 0.05 k_cr.
     """
     return Claim(
         id="N2",
@@ -146,7 +148,7 @@ def normal_stress_effect_claim(law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the critical decrease of normal stress.
+        Claim about the critical decrease of normal stress.
     """
     where = {"law": law, "stiffness_ratio": 0.5}
     return Claim.below(

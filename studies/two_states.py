@@ -1,11 +1,12 @@
 """Period doubling and chaos under a law with two states.
 
-A second state variable with a longer slip distance limits the slip rate, so a spring slightly
-softer than critical oscillates even without inertia and under the slip law (Gu et al. 1984; Becker
-2000). If the stiffness decreases, the period doubles repeatedly until the motion is chaotic. At
-still lower stiffness, the slip rate is unbounded. The first period doubling occurs when a Floquet
-multiplier of the period-one cycle passes through -1. Below the stiffness of the first period
-doubling, the period-one cycle still exists but is repelling.
+A second state variable with a longer slip distance limits the slip rate. A slider on a spring that
+is slightly softer than critical therefore oscillates, even without inertia and under the slip law
+(Gu et al. 1984; Becker 2000). As the stiffness decreases, the period doubles repeatedly until the
+motion is chaotic. At still lower stiffness, the slip rate is unbounded. The first period doubling
+occurs when a Floquet multiplier of the period-one cycle passes through -1. Below the stiffness of
+the first period doubling, the period-one cycle still exists, but neighbouring motions diverge from
+it.
 """
 
 import math
@@ -38,7 +39,7 @@ def spring_place(ratio: float) -> dict[str, str | float]:
     Returns
     -------
     dict
-        Coordinates of the lattice.
+        Coordinates of the lattice cell.
     """
     return {**LAW_SELECTION, "stiffness_ratio": ratio}
 

@@ -1,13 +1,14 @@
 """Estimates of a, b, a - b and D_c from velocity steps.
 
-The load point velocity changes from V_* to r V_*, and friction is recorded over 20 D_c. The direct
-effect, the following evolution, and the displacement over which the evolution decays to 1/e give
-estimates of a, b and D_c. On soft machines, the estimates of a and b are too small. At 10 k_cr,
-tenfold steps give a value of a that is 14 to 40 % too small. The estimate of a - b is correct if
-friction has reached steady state. The error of the estimate of D_c depends on the stiffness of the
-machine. Under the slowness law, this error also depends on the direction of the step. A correction
-for stiffness does not remove these dependences. Under the slip law, large steps up on soft machines
-end in instability.
+The load point velocity changes from V_* to r V_*, and friction is recorded over 20 D_c. The
+estimate of a follows from the direct effect, the estimate of b follows from the evolution after it,
+and the estimate of D_c is the displacement over which the evolution decays to 1/e. On soft
+machines, the estimates of a and b are too small. At 10 k_cr, tenfold steps give a value of a that
+is 14 to 40 % too small. The estimate of a - b is correct if friction has reached steady state. The
+error of the estimate of D_c depends on the stiffness of the machine. Under the slowness law, this
+error also depends on the direction of the step. Correcting the estimate for stiffness does not
+remove these two dependences. Under the slip law, large steps up on soft machines end in
+instability.
 """
 
 import math
@@ -33,9 +34,9 @@ STEP_DESCRIPTIONS = {0.01: "down by 100", 0.1: "down by 10", 10.0: "up by 10", 1
 def peak_departure(law: str, ratio: float) -> float:
     """Compute the difference of peak friction from the closed form.
 
-    The difference is computed to first order in a/K. The difference has two causes: the evolution
-    is incomplete while slip accelerates, and slip is faster than the load point while friction
-    decreases, which increases the direct effect.
+    The difference is computed to first order in a/K. The difference has two causes. First, the
+    evolution is incomplete while slip accelerates. Second, slip is faster than the load point while
+    friction decreases, which increases the direct effect.
 
     Parameters
     ----------
@@ -56,7 +57,7 @@ def peak_departure(law: str, ratio: float) -> float:
 
 
 def rigid_limit_claim(law: str, ratio: float) -> Claim:
-    """Return a claim on the difference from a rigid slider (P6).
+    """Return a claim about the difference from a rigid slider (P6).
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def rigid_limit_claim(law: str, ratio: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the largest difference of friction.
+        Claim about the largest difference of friction.
     """
     forms = {
         "slip": "dmu = a ln r - b ln r [1 - exp(-delta/D_c)]",
@@ -106,7 +107,7 @@ def direct_effect_claim(law: str, ratio: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the estimate of a.
+        Claim about the estimate of a.
     """
     return Claim.below(
         id="P7",
@@ -132,7 +133,7 @@ def rate_dependence_claim(law: str, ratio: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the estimate of a - b at 3 k_cr.
+        Claim about the estimate of a - b at 3 k_cr.
     """
     return Claim(
         id="P8",
@@ -149,7 +150,7 @@ def rate_dependence_claim(law: str, ratio: float) -> Claim:
 
 
 def slip_distance_claim(ratio: float) -> Claim:
-    """Return a claim on the estimate of D_c under the slowness law (P9).
+    """Return a claim about the estimate of D_c under the slowness law (P9).
 
     Under the slowness law, the slip over which the evolution decays to 1/e is not equal to D_c.
 
@@ -161,7 +162,7 @@ def slip_distance_claim(ratio: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the estimate of D_c.
+        Claim about the estimate of D_c.
     """
     left = math.log((ratio - 1.0) / (ratio ** (1.0 / math.e) - 1.0))
     return Claim(
@@ -183,7 +184,7 @@ PLOTTED_DISPLACEMENT = 8.0
 
 
 def smallest_steps(ratios: list[float]) -> list[float]:
-    """Return the smallest step down and the smallest step up.
+    """Return the smallest step up and the smallest step down.
 
     Parameters
     ----------

@@ -1,14 +1,14 @@
 """Clock advance of stick-slip events by a train of waves.
 
-Two waves of normal stress, which first decrease normal stress, reach a slider during its stick-slip
-cycle. Small waves advance or delay the next event in proportion to their amplitude, as predicted by
-linear perturbation theory. Under the slowness law, waves have no effect if they end several
-nucleation times a sigma/(k V_0) before the event. Slow waves and strong waves trigger the event
-when Coulomb stress reaches the threshold of an event without waves. For slow waves with a period of
-a hundred nucleation times, the clock advance from this threshold of Coulomb stress is accurate to a
-few percent. For strong waves, which raise Coulomb stress faster than the load point does, the error
-of this clock advance is at most one nucleation time. In all other cases, the clock advance from the
-threshold is wrong by a factor of two to ten.
+A train of two waves changes the normal stress of a slider during its stick-slip cycle. The first
+half of each wave decreases normal stress. Small waves advance or delay the next event in proportion
+to their amplitude, as predicted by linear perturbation theory. Under the slowness law, waves have
+no effect if they end several nucleation times a sigma/(k V_0) before the event. Slow waves and
+strong waves trigger the event when Coulomb stress reaches the threshold at which an event occurs
+without waves. For slow waves with a period of a hundred nucleation times, the clock advance that
+this threshold predicts is accurate to a few percent. Strong waves raise Coulomb stress faster than
+the load point does. For strong waves, the error of the predicted clock advance is at most one
+nucleation time. In all other cases, the prediction is wrong by a factor of two to ten.
 """
 
 from collections.abc import Callable
@@ -62,7 +62,7 @@ def claim_place(law: str, period: float, amplitude: float, phase: float) -> dict
     Returns
     -------
     dict
-        Coordinates of the lattice.
+        Coordinates of the lattice cell.
     """
     return {
         "law": law,
@@ -110,7 +110,7 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the clock advance to the prediction of linear theory.
+        Claim about the ratio of the clock advance to the prediction of linear theory.
     """
     within = 2.0 * SMALL * SECOND_ORDER_RATIO
     return Claim(
@@ -128,7 +128,7 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
 
 
 def coulomb_limit_claim(law: str, phase: float) -> Claim:
-    """Return the claim that slow waves trigger at a Coulomb threshold (W2).
+    """Return the claim that slow waves trigger events at a Coulomb threshold (W2).
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def coulomb_limit_claim(law: str, phase: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the clock advance to the prediction of the Coulomb threshold.
+        Claim about the ratio of the clock advance to the prediction of the Coulomb threshold.
     """
     return Claim(
         id="W2",
@@ -160,7 +160,7 @@ def coulomb_limit_claim(law: str, phase: float) -> Claim:
 
 
 def strong_waves_claim(law: str) -> Claim:
-    """Return the claim that strong waves trigger at a Coulomb threshold (W3).
+    """Return the claim that strong waves trigger events at a Coulomb threshold (W3).
 
     Strong waves increase Coulomb stress faster than the load point does.
 
@@ -172,7 +172,7 @@ def strong_waves_claim(law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the clock advance to the prediction of the Coulomb threshold.
+        Claim about the ratio of the clock advance to the prediction of the Coulomb threshold.
     """
     return Claim(
         id="W3",
@@ -200,7 +200,7 @@ def early_train_claim(amplitude: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the clock advance under the slowness law.
+        Claim about the clock advance under the slowness law.
     """
     return Claim(
         id="W4",
@@ -231,7 +231,7 @@ def coulomb_error_claim(law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the clock advance to the prediction of the Coulomb threshold.
+        Claim about the ratio of the clock advance to the prediction of the Coulomb threshold.
     """
     return Claim.above(
         id="W5",

@@ -1,10 +1,10 @@
 """Sobol indices of critical displacement, stress drop and recurrence interval.
 
-The parameters a, b - a and k have independent uncertainties of 10 %. The critical displacement step
-D_c a/(b - a) depends equally on a and on b - a. The stress drop depends almost only on b - a. The
-recurrence interval is the stress drop divided by k V_0, so it depends on b - a and on k.
-First-order and total indices are equal, so the parameters do not interact. Bars are 95 % confidence
-intervals.
+The parameters a, b - a and k are uncertain by 10 % each, and their errors are independent. The
+critical displacement step D_c a/(b - a) depends equally on a and on b - a. The stress drop depends
+almost only on b - a. The recurrence interval is the stress drop divided by k V_0, so it depends on
+b - a and on k. First-order and total indices are equal, so the parameters do not interact. Error
+bars in the figure show 95 % confidence intervals.
 """
 
 import math
@@ -100,7 +100,7 @@ def interval_claim(name: str, order: str, end: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on one end of the confidence interval.
+        Claim about one end of the confidence interval.
     """
     where = "begins below" if end == "low" else "ends above"
     return Claim(
@@ -116,7 +116,7 @@ def interval_claim(name: str, order: str, end: str) -> Claim:
 
 
 def first_order_claim(of: str, name: str, share: float) -> Claim:
-    """Return a claim on a total Sobol index of the limit cycle (W3).
+    """Return a claim about a total Sobol index of the limit cycle (W3).
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def first_order_claim(of: str, name: str, share: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the total index.
+        Claim about the total index.
     """
     return Claim(
         id="W3",
