@@ -375,7 +375,7 @@ def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:
     if stated_sign is None:
         return -1.0 if stress.max() < 0.0 else 1.0
     if stated_sign not in (-1, 1):
-        raise InvalidValue("sign", stated_sign, "is unknown", choices=("1", "-1"))
+        raise InvalidValue("sign", stated_sign, "must be 1 or -1")
     return float(stated_sign)
 
 

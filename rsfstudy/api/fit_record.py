@@ -281,7 +281,7 @@ def fit(
     for one in records:
         if not isinstance(one, Record):
             remedy = "Read a record with rsfstudy.read_record."
-            raise InvalidValue("record", one, "is not a record", remedy=remedy)
+            raise InvalidValue("record", one, "must be a Record", remedy=remedy)
     records = tuple(_add_normal_stress_of_rig(one, rig) for one in records)
     numbers = _select_step_numbers(records, steps)
     guess = _guess_slip_distance(records[0], rig, numbers[0], slip_distance)
@@ -547,7 +547,10 @@ def _free_parameters(
     shared = tuple(name for name in free if any(name in names for names in own.values()))
     for name in stated_parameters:
         if name not in shared:
-            rule = f"is not a parameter with {' or '.join(f'law={law!r}' for law in laws)}"
+            rule = (
+                f"must contain parameters of {' or '.join(f'law={law!r}' for law in laws)}, but "
+                f"{name!r} is not one of them"
+            )
             remedy = (
                 _REMEDY_FOR_WRONG_STATE_PARAMETERS
                 if name in (*_EVOLUTION_EFFECT_PARAMETERS, "slip_distance_2")
@@ -571,7 +574,7 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
     is empty if the user passes neither ``averaging`` nor ``low_pass``.
     """
     if averaging is not None and low_pass:
-        remedy = "Pass `averaging=` or `low_pass=`."
+        remedy = "Pass either averaging= or low_pass=, not both."
         raise InvalidValue("low_pass", low_pass, "cannot be combined with averaging", remedy=remedy)
     if averaging is not None:
         kind, size = MEAN, averaging

@@ -73,7 +73,7 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
         table, name = measure_motion_holds(record), "motion"
     else:
         remedy = "Pass a record from rsfstudy.read_record, the path of its file, or a motion."
-        raise InvalidValue("record", record, "is not a record", remedy=remedy)
+        raise InvalidValue("record", record, "must be a record or a motion", remedy=remedy)
     if not table.sizes["hold"]:
         remedy = "If the steps are not detected, specify them: record.with_steps([...])."
         rule = "has no hold of the load point between sliding and reloading"

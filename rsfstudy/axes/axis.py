@@ -167,7 +167,7 @@ class Axis:
         """Create an axis from values or points."""
         if not is_variable_name(dimension):
             rule = "must be a Python identifier in Unicode normalisation form NFC"
-            raise InvalidValue("axis", dimension, rule)
+            raise InvalidValue("axis name", dimension, rule)
         labels: tuple[str, ...] | None = None
         if (
             isinstance(values, Mapping)
@@ -476,12 +476,12 @@ def _rows_from_columns(
     """Create the rows of an axis with numbered points from lists of values."""
     lengths = {name: len(column) for name, column in values_by_field.items()}
     for name, length in lengths.items():
-        if not is_variable_name(name) or name == dimension:
-            rule = (
-                "must be the name of a field, and must differ from the name of the axis, "
-                f"{dimension!r}"
-            )
-            raise InvalidValue("column", name, rule)
+        if not is_variable_name(name):
+            raise InvalidValue("column", name, "does not have the name of a field")
+        if name == dimension:
+            rule = "has the name of the axis"
+            remedy = "Rename the column or the axis."
+            raise InvalidValue("column", name, rule, remedy=remedy)
         if length != max(lengths.values()):
             raise InvalidValue("columns", lengths, "must have the same length")
     made = [

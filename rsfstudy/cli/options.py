@@ -183,7 +183,7 @@ json_option = click.option(
 study_name_or_all_argument = combine_option_decorators(
     click.argument("name", required=False),
     click.option(
-        "--all", "every", is_flag=True, help="Process all studies that the command list shows."
+        "--all", "every", is_flag=True, help="Process all studies that `rsfstudy list` shows."
     ),
 )
 output_option = make_output_option("Results directory.", Defaults.OUTPUT_DIRECTORY, file_okay=False)

@@ -164,7 +164,11 @@ class Elasticities(Measure):
         )
         for name in self.parameters:
             if name not in self._differentiable_parameter_names:
-                rule = f"is not a numeric field of the scene, or is computed by {self.measure.name}"
+                rule = (
+                    f"is computed by {self.measure.name}, so it has no elasticity"
+                    if name in self.measure.solved_fields
+                    else "is not a numeric field of the scene"
+                )
                 choices, remedy = (
                     ((), _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES)
                     if name in _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS

@@ -564,17 +564,19 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             choices=variables,
         )
     for name in names:
-        if (
-            not is_variable_name(name)
-            or name in RESERVED_NAMES - {*measure.solved_fields}
-            or names.count(name) > 1
-        ):
-            rule = "is reserved, is not unique or is not a valid variable name"
+        rule = ""
+        if not is_variable_name(name):
+            rule = "does not have a Python identifier in Unicode normalisation form NFC as its name"
+        elif name in RESERVED_NAMES - {*measure.solved_fields}:
+            rule = "has a reserved name"
+        elif names.count(name) > 1:
+            rule = "is declared more than once"
+        if rule:
             raise InvalidValue("variable", name, rule).with_location(f"measure {measure.name}")
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
             raise InvalidValue(
-                "dimensions", dims, "must be names without repetition"
+                "dimensions", dims, "must be a tuple of different names"
             ).with_location(f"output {name}")
         for dim in dims:
             if dim not in measure.inner_coordinates:

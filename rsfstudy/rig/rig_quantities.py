@@ -48,7 +48,7 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
     ),
     "stiffness": RigQuantity("Pa/m", 1e4, 1e15, "$k$", "stiffness of the machine with its sample"),
     "period": RigQuantity("s", 1e-6, 1e3, "$T$", "period of free oscillation"),
-    "mass": RigQuantity("kg/m^2", 1e-2, 1e9, "$m$", "mass per area of the fault"),
+    "mass": RigQuantity("kg/m^2", 1e-2, 1e9, "$m$", "mass per unit fault area"),
     "shear_modulus": RigQuantity("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
     "density": RigQuantity("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
     "thermal_diffusivity": RigQuantity(

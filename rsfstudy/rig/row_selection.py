@@ -173,7 +173,9 @@ class RowSelection:
         if chosen := parse_filter(self.filter):
             if "time" not in found:
                 remedy = "Omit the filter."
-                raise InvalidValue("filter", self.filter, "requires the column time", remedy=remedy)
+                raise InvalidValue(
+                    "filter", self.filter, "requires the column 'time'", remedy=remedy
+                )
             time = found["time"]
             kept = chosen.complete_rows(time)
             found |= {name: chosen.filter_rows(time, found[name]) for name in filtered_names}

@@ -53,7 +53,7 @@ def check_types(study_fields: Mapping[str, Any]) -> None:
             raise InvalidValue(name, given, f"must be a list of {kind.__name__} objects")
         for value in given if is_list else [given]:
             if not isinstance(value, kind) and not (name == "rig" and value is None):
-                rule = f"must be an object of the class {kind.__name__}"
+                rule = f"must be a {kind.__name__} object"
                 rule = f"must contain {kind.__name__} objects" if is_list else rule
                 raise InvalidValue(name, value, rule)
     if not study_fields["axes"]:
@@ -83,10 +83,12 @@ def check_name_clashes(
     measure.check()
     known = list(measure.variables)
     for reduction in reductions:
-        if not is_variable_name(reduction.name) or reduction.name in RESERVED_NAMES:
-            raise InvalidValue(
-                "reduction", reduction.name, "is reserved or is not a valid variable name"
-            )
+        if not is_variable_name(reduction.name):
+            rule = "must be a Python identifier, because it is a variable name"
+            raise InvalidValue("name of the reduction", reduction.name, rule)
+        if reduction.name in RESERVED_NAMES:
+            remedy = "Rename the reduction."
+            raise InvalidValue("reduction", reduction.name, "has a reserved name", remedy=remedy)
         if reduction.of not in known:
             raise InvalidValue(
                 "variable",
@@ -196,7 +198,7 @@ def check_axis_fields(
             if name not in known:
                 rule = (
                     "is neither a field of a scene nor a number, flag or string field of the "
-                    f"measure {measure.name}"
+                    f"{measure.name} measure"
                 )
                 raise unknown_name_error("field", name, rule, known)
 
