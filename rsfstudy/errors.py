@@ -22,7 +22,7 @@ _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60,
 #: Kinds of objects that an error message identifies by name, as in "column 'speed' is unknown".
 _KINDS_OF_NAMED_OBJECTS = frozenset(
     {"axis", "column", "dimension", "directory", "field", "header", "heading", "key", "line"}
-    | {"override", "problem", "reduction", "sheet", "study", "table", "variable"}
+    | {"override", "problem", "reduction", "segment", "sheet", "study", "table", "variable"}
 )
 #: Maximum number of characters of a message.
 _MAX_MESSAGE_LENGTH = 5000

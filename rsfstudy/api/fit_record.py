@@ -376,7 +376,7 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
         if not 1 <= number <= count:
-            rule = f"must be the number of a step, from 1 to {count}"
+            rule = f"must contain step numbers from 1 to {count}"
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:
@@ -547,10 +547,7 @@ def _free_parameters(
     shared = tuple(name for name in free if any(name in names for names in own.values()))
     for name in stated_parameters:
         if name not in shared:
-            rule = (
-                f"must contain parameters of {' or '.join(f'law={law!r}' for law in laws)}, but "
-                f"{name!r} is not one of them"
-            )
+            rule = f"must only contain parameters of {' or '.join(f'law={law!r}' for law in laws)}"
             remedy = (
                 _REMEDY_FOR_WRONG_STATE_PARAMETERS
                 if name in (*_EVOLUTION_EFFECT_PARAMETERS, "slip_distance_2")

@@ -107,7 +107,7 @@ def _check_sampling_arguments(
         raise InvalidValue("n", sample_count, f"must be at most {MAX_ITEMS_OF_LIST_ARGUMENT:,}")
     if method in _SOBOL_METHODS and sample_count & (sample_count - 1):
         below = 1 << (int(sample_count).bit_length() - 1)
-        rule = "must be a power of two, because only such numbers of Sobol points are balanced"
+        rule = "must be a power of two, because Sobol sequences are balanced only for powers of two"
         remedy = f"Use n={below} or n={2 * below}, or method='latin_hypercube'."
         raise InvalidValue("n", sample_count, rule, remedy=remedy)
     for name, drawn in distributions.items():
@@ -315,7 +315,7 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         If the object is not a table, if a column occurs twice, or if units contradict each other.
     """
     if not hasattr(table, "keys") or getattr(table, "ndim", 2) != 2 or not len(table):
-        rule = "is not a table with named columns"
+        rule = "must have named columns"
         remedy = "Pass a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
         raise InvalidValue("table", table, rule, remedy=remedy)
     found: dict[str, Any] = {}

@@ -129,7 +129,11 @@ def check_free_parameters(free: Sequence[str]) -> None:
         if name not in PARAMETERS:
             remedy = f"Write {PARAMETER_SYNONYMS[name]}." if name in PARAMETER_SYNONYMS else ""
             raise InvalidValue(
-                "free", name, "is not a parameter", choices=PARAMETERS, remedy=remedy
+                "free",
+                name,
+                "must only contain names of parameters",
+                choices=PARAMETERS,
+                remedy=remedy,
             )
 
 

@@ -281,6 +281,9 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
 def _incompatible_units_error(quantity_name: str, value: Any, units: str) -> InvalidValue:
     if units == "1":
         return InvalidValue(quantity_name, value, "must be a number without units")
+    if isinstance(value, str) and not value.strip(" 0123456789.+-"):
+        remedy = f"Write the units after the number, for example '{value.strip()} {units}'."
+        return InvalidValue(quantity_name, value, "has no units", remedy=remedy)
     rule = f"has units that are incompatible with {units}"
     return InvalidValue(quantity_name, value, rule, remedy=f"Use {units} or multiples of {units}.")
 

@@ -226,8 +226,9 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
         if "distance" in declared_segment:
             distance = declared_segment["distance"]
             if "duration" in declared_segment:
-                rule = f"cannot be combined with distance (got {distance!r})"
-                raise InvalidValue("duration", duration, rule)
+                rule = f"cannot be combined with distance = {distance!r}"
+                remedy = "Omit one of the two."
+                raise InvalidValue("duration", duration, rule, remedy=remedy)
             distance = _read_positive_number(declared_segment, "distance", "positive and finite")
             duration = distance / _read_positive_number(
                 declared_segment, "velocity", "positive in a segment with a distance"
@@ -257,7 +258,7 @@ def _build_validated_segment(
     if not _is_number(step) or not math.isfinite(step):
         raise InvalidValue("step", step, "must be a finite number")
     if not _is_number(duration) or not duration > 0.0:
-        remedy = "Remove segments that have no duration."
+        remedy = "Remove segments with zero duration."
         raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
     if not _is_number(normal_stress) or not -1.0 < normal_stress < math.inf:
         rule = "must be greater than -1, because it is the imposed normal stress minus sigma_*"

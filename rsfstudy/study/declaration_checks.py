@@ -103,7 +103,7 @@ def check_name_clashes(
         for name in (axis.dimension, *axis.fields):
             if name in taken:
                 remedy = "Rename the result or the field of the axis."
-                raise InvalidValue("axis", name, "is already the name of a result", remedy=remedy)
+                raise InvalidValue("axis", name, "has the name of a result", remedy=remedy)
 
 
 def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:
@@ -187,7 +187,9 @@ def check_axis_fields(
     known = dict.fromkeys((*scene_field_names, *measure.plain_fields, *in_units))
     for axis in axes:
         if not axis.is_single_field and axis.dimension in (*scene_field_names, *axis.fields):
-            rule = "is the name of a field, so it cannot be the name of a zipped axis"
+            rule = (
+                "has the name of a field, but the name of a zipped axis must differ from all fields"
+            )
             raise InvalidValue("axis", axis.dimension, rule)
         if axis.units and scenes_on_rig is None:
             remedy = "Pass the rig to the study: Study(rig=rig)."

@@ -64,7 +64,8 @@ class RecordEvents(CommandResult):
     "--sign",
     type=click.Choice(["1", "-1"]),
     help="Sign convention of the record: 1 if shear stress in the direction of sliding is "
-    "recorded as positive, -1 if it is recorded as negative.  [default: -1 if all samples are negative, otherwise 1]",
+    "recorded as positive, -1 if it is recorded as negative.  [default: -1 if all "
+    "samples are negative, otherwise 1]",
 )
 @options.json_option
 def events(given: options.CommandOptions) -> int:

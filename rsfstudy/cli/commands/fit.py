@@ -125,10 +125,11 @@ def _make_comma_list_option(
 @_make_comma_list_option(
     "--free",
     metavar="NAME,...",
-    help_text="Parameters to fit, separated by commas. In addition to the default parameters, you "
-    "can fit stiffness, step_time, trend2, alpha and, for law=family, law_exponent. Parameters "
-    "that do not occur in a law are ignored for that law.  [default: a, b, slip_distance, mu_star and trend1; for laws with two state variables: a, b1, "
-    "b2, slip_distance, slip_distance_2, mu_star and trend1]",
+    help_text="Parameters to fit, separated by commas. In addition to the default parameters, "
+    "you can fit stiffness, step_time, trend2, alpha and, for law=family, law_exponent. "
+    "Parameters that do not occur in a law are ignored for that law.  [default: a, b, "
+    "slip_distance, mu_star and trend1; for laws with two state variables: a, b1, b2, "
+    "slip_distance, slip_distance_2, mu_star and trend1]",
 )
 @_make_comma_list_option(
     "--step",
