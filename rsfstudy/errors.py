@@ -234,8 +234,8 @@ def _format_violation(name: str, value: object, shown_value: str, rule: str) -> 
     subject = repr(name) if name.isalpha() and not is_kind else name
     if value is ... or (value is None and rule.startswith(("is required", "is missing"))):
         return f"{subject} {rule}."
-    is_plain = value is None or isinstance(value, str | Number)
-    if (rule.startswith("must ") or not is_plain) and "(got " not in rule:
+    is_short = value is None or isinstance(value, str | Number) or callable(value)
+    if (rule.startswith("must ") or not is_short) and "(got " not in rule:
         requirement, conjunction, reason = rule.partition(", because")
         return f"{subject} {requirement} (got {shown_value}){conjunction}{reason}."
     if name == "field" and rule.startswith(("is not a field", "is neither a field")):

@@ -118,7 +118,9 @@ def foreign() -> Iterator[tuple[dict[str, Any], str]]:
 
 @pytest.mark.parametrize(("fields", "name"), list(foreign()), ids=str)
 def test_no_field_is_taken_for_nothing(fields, name):
-    with pytest.raises(InvalidValue, match=rf"^{name} = 0.5 (does not apply|cannot be set for law)"):
+    with pytest.raises(
+        InvalidValue, match=rf"^{name} = 0.5 (does not apply|cannot be set for law)"
+    ):
         Scene(**fields)
 
 

@@ -364,8 +364,8 @@ def _parse_loading_step(step_fields: Sequence[float]) -> LoadingStep:
     if isinstance(step_fields, LoadingStep):  # Steps from another record are already valid.
         return step_fields
     rule = (
-        "is not a step. A step consists of the beginning, the end, the velocities before and "
-        "after, and optionally the "
+        "must consist of the beginning, the end, the velocities before and after, and "
+        "optionally the "
     )
     rule += "normal stresses before and after"
     try:
