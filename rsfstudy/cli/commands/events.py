@@ -58,7 +58,7 @@ class RecordEvents(CommandResult):
 @make_quantity_option(
     "--stiffness",
     "Stiffness between the fault and the displacement sensor. If the record contains fault "
-    "slip, pass inf. Example: '0.05 MPa/um'.",
+    "slip, pass 'inf'. Example: '0.05 MPa/um'.",
 )
 @click.option(
     "--sign",

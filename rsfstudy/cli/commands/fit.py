@@ -178,7 +178,7 @@ def _make_comma_list_option(
 @make_quantity_option(
     "--averaging",
     "Averaging time of the data logger. If each averaging window ends at the recorded time, "
-    "write trailing before the averaging time. Examples: '1 s' or 'trailing 1 s'.  [default: "
+    "write 'trailing' before the averaging time. Examples: '1 s' or 'trailing 1 s'.  [default: "
     "no averaging]",
 )
 @click.option(
