@@ -348,7 +348,7 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
     [
         ({"rows": (0, 5)}, "'rows' must be the numbers of the first and the last row"),
         ({"rows": (5, 3)}, "'rows' must be"),
-        ({"rows": (500, 600)}, "selects no rows of the record, which has 40 rows"),
+        ({"rows": (500, 600)}, "must contain at least one of the 40 rows of the record"),
         ({"begin": "2 MPa"}, "begin = '2 MPa' is neither a time nor a displacement"),
         ({"begin": "x"}, "begin = 'x' is neither a time nor a displacement"),
         ({"begin": "1 h"}, "begin = '1 h' is outside the record, which covers 0 to 9.75 s"),
@@ -413,7 +413,9 @@ def test_a_force_needs_the_area(tmp_path: Path) -> None:
     header = HEADER.replace("Shear stress (MPa)", "Force (kN)")
     (tmp_path / "run.csv").write_text(lines_of(",", header))
     for read in (rsfstudy.read_record, rsfstudy.events):
-        with pytest.raises(InvalidValue, match=r"contains a force .got 'kN'.*area='25 cm2'"):
+        with pytest.raises(
+            InvalidValue, match=r"must be a stress, not a force .got 'kN'.*area='25 cm2'"
+        ):
             read(tmp_path / "run.csv")
     record = rsfstudy.read_record(tmp_path / "run.csv", area="5 cm2")
     np.testing.assert_allclose(record.columns["friction"], 2.0 * FRICTION, rtol=1e-11)

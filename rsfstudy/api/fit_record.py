@@ -608,7 +608,9 @@ def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
         )
     if len({record.filter for record in records}) > 1:
         remedy = "Read all records with the same filter=, or fit them separately."
-        raise InvalidValue("filter", sorted(filters), "differs between the records", remedy=remedy)
+        raise InvalidValue(
+            "filter", sorted(filters), "must be the same for all records", remedy=remedy
+        )
     return filters.pop()
 
 

@@ -225,7 +225,7 @@ class Claim:
                 rule = "is not a coordinate of the results"
                 raise self._invalid("where", name, rule, choices=sorted(coordinates))
         if self.verdict(dataset)[1] == NOT_APPLICABLE_VERDICT:
-            rule = "is not a point of the lattice"
+            rule = "must be a point of the lattice"
             raise self._invalid("where", {**self.where, **self.baseline}, rule)
 
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:
