@@ -10,6 +10,7 @@ import difflib
 import reprlib
 import signal
 from collections.abc import Iterable
+from numbers import Number
 
 from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
 
@@ -20,8 +21,8 @@ __getattr__ = build_getattr_for_former_names(__name__)
 _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
 #: Kinds of objects that an error message identifies by name, as in "column 'speed' is unknown".
 _KINDS_OF_NAMED_OBJECTS = frozenset(
-    {"axis", "column", "dimension", "directory", "field", "header", "heading", "override"}
-    | {"problem", "reduction", "sheet", "study", "table", "variable"}
+    {"axis", "column", "dimension", "directory", "field", "header", "heading", "key", "line"}
+    | {"override", "problem", "reduction", "segment", "sheet", "study", "table", "variable"}
 )
 #: Maximum number of characters of a message.
 _MAX_MESSAGE_LENGTH = 5000
@@ -112,6 +113,8 @@ class InvalidValue(RsfStudyError, ValueError):
     ) -> None:
         """Build the message from the value, the rule and the choices."""
         choices = list(choices)
+        if rule == "is unknown" and choices and not isinstance(value, str):
+            rule, choices = f"must be {_format_alternatives(choices)}", []
         shown = _short_value_repr.repr(value)
         text = _format_violation(shorten_text(name), value, shown, rule)
         compared = [
@@ -226,16 +229,25 @@ class IncompleteWarning(RsfStudyWarning):
 
 def _format_violation(name: str, value: object, shown_value: str, rule: str) -> str:
     """Write a sentence that contains a name, its invalid value and the violated rule."""
+    is_kind = name in _KINDS_OF_NAMED_OBJECTS
+    # A name such as "where" could be read as an English word, so it is written in quotation marks.
+    subject = repr(name) if name.isalpha() and not is_kind else name
     if value is ... or (value is None and rule.startswith(("is required", "is missing"))):
-        return f"{name} {rule}."
-    if rule.startswith("must ") and "(got " not in rule:
+        return f"{subject} {rule}."
+    is_short = value is None or isinstance(value, str | Number) or callable(value)
+    if (rule.startswith("must ") or not is_short) and "(got " not in rule:
         requirement, conjunction, reason = rule.partition(", because")
-        return f"{name} {requirement} (got {shown_value}){conjunction}{reason}."
+        return f"{subject} {requirement} (got {shown_value}){conjunction}{reason}."
     if name == "field" and rule.startswith(("is not a field", "is neither a field")):
         return f"{shown_value} {rule}."
-    is_name = name in _KINDS_OF_NAMED_OBJECTS and isinstance(value, str)
-    relation = " " if is_name else " = "
+    relation = " " if is_kind and isinstance(value, str) else " = "
     return f"{name}{relation}{shown_value} {rule}."
+
+
+def _format_alternatives(choices: list[str]) -> str:
+    """Format valid choices as a list whose last two items are joined by "or"."""
+    *others, last = map(repr, choices[:_MAX_CHOICES])
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def shorten_text(text: object, max_length: int = _MAX_CHARACTERS_OF_VALUE) -> str:

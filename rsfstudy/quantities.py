@@ -134,7 +134,7 @@ class Output(Quantity):
         """Check that a description accompanies a symbol, units or a scale."""
         if not self.long_name and (self.symbol or self.scale or self.units != "1"):
             rule = (
-                f"must contain a description of {self.name}, because {self.name} has a "
+                f"must contain a description of {self.name!r}, because {self.name!r} has a "
                 "symbol, units or a scale"
             )
             raise InvalidValue("long_name", self.long_name, rule)

@@ -92,10 +92,10 @@ def test_results_know_their_study_and_each_cell_its_scene(results):
         assert cell.rsf.scene == STUDY.scene(number)
         assert cell.rsf.study.size == 4
     with pytest.raises(
-        InvalidValue, match=r"stiffness_ratio = \[0.8, 1.2\] does not select a single cell"
+        InvalidValue, match=r"stiffness_ratio must have a single value \(got \[0.8, 1.2\]\)"
     ):
         _ = results.sel(law="slip").rsf.scene
-    with pytest.raises(InvalidValue, match=r"law = \[\] does not select a single cell"):
+    with pytest.raises(InvalidValue, match=r"'law' must have a single value \(got \[\]\)"):
         _ = results.isel(law=0, stiffness_ratio=0, drop=True).rsf.scene
     elsewhere = results.isel(law=0, stiffness_ratio=0).assign_coords(stiffness_ratio=7.0)
     with pytest.raises(

@@ -271,7 +271,7 @@ def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypat
 def test_an_error_keeps_both_ends_of_what_is_long():
     error = InvalidValue("name", "begin" + "x" * 10_000 + "end", "must be short")
     assert len(str(error)) < 200
-    assert str(error).startswith("name must be short (got 'begin")
+    assert str(error).startswith("'name' must be short (got 'begin")
     assert str(error).endswith("end').")
     many = InvalidValue("name", "25", "is unknown", choices=map(str, range(300)), remedy="Choose.")
     assert "Did you mean '25'" in str(many)

@@ -47,16 +47,16 @@ def fitted(record: dict[str, np.ndarray] | Record, **options: Any) -> xr.Dataset
 
 def test_columns_that_are_mistaken_are_told() -> None:
     moved, friction = GOOD["displacement"], GOOD["friction"]
-    with pytest.raises(InvalidValue, match="displacement = .* Reverse the sign"):
+    with pytest.raises(InvalidValue, match="'displacement' must increase .* Reverse the sign"):
         fitted(GOOD | {"displacement": -moved})
-    with pytest.raises(InvalidValue, match="displacement = .* select other columns"):
+    with pytest.raises(InvalidValue, match="'displacement' must increase .* select other columns"):
         fitted(GOOD | {"displacement": friction, "friction": moved})
 
 
 def test_slip_that_is_given_as_load_point_displacement_is_told() -> None:
     """The same column is accepted if it is named slip."""
     slip = GOOD["displacement"] - (GOOD["friction"] - GOOD["friction"][0]) / 3e-3
-    with pytest.raises(InvalidValue, match="is the slip of the fault at step 1.* 'slip=HEADING"):
+    with pytest.raises(InvalidValue, match="but is fault slip at step 1.* 'slip=HEADING"):
         fitted(GOOD | {"displacement": slip})
     named = {"time": GOOD["time"], "slip": slip, "friction": GOOD["friction"]}
     record = rsfstudy.read_record(named, stiffness=3e-3)
@@ -69,11 +69,13 @@ def test_filters_of_a_record_are_filters_of_its_fit() -> None:
     with pytest.raises(
         InvalidValue,
         match="filter = 'mean 2.0' cannot be applied, because the "
-        "record was read with filter=. Leave",
+        "record was read with filter=. Omit",
     ):
         fitted(record, averaging="2 s")
     other = rsfstudy.read_record(GOOD, name="other")
-    with pytest.raises(InvalidValue, match="filter = ..mean 1.0.. differs between the records"):
+    with pytest.raises(
+        InvalidValue, match="'filter' must be the same for all records .got ..mean 1.0"
+    ):
         rsfstudy.fit([record, other], stiffness=3e-3, laws=["slip"])
 
 

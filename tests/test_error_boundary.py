@@ -118,43 +118,49 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda r: r.window("5 s", "9 s"), "start must be a number"),
-        (lambda r: r.with_steps([(1, 2)]), r"step = \(1, 2\) is not a step"),
-        (lambda r: r.with_steps(7), "steps must be a list"),
-        (lambda r: rsfstudy.fit("rec.csv"), "record = 'rec.csv' is not a record. .*read_record"),
+        (lambda r: r.window("5 s", "9 s"), "'start' must be a number"),
+        (lambda r: r.with_steps([(1, 2)]), r"'step' must consist of the beginning, .*got \(1, 2\)"),
+        (lambda r: r.with_steps(7), "'steps' must be a list"),
+        (
+            lambda r: rsfstudy.fit("rec.csv"),
+            "'record' must be a Record .got 'rec.csv'.. .*read_record",
+        ),
         (
             lambda r: rsfstudy.fit(r, laws="slip", stiffness=1e-3),
-            r"laws must be a list.*'slip'.*\['slip'\]",
+            r"'laws' must be a list.*'slip'.*\['slip'\]",
         ),
-        (lambda r: RIG.axis("slip_distance", ["1 um"], units=5), "units must be a mapping"),
-        (lambda r: RIG.in_units("x"), "dataset must be an xarray.Dataset"),
+        (lambda r: RIG.axis("slip_distance", ["1 um"], units=5), "'units' must be a mapping"),
+        (lambda r: RIG.in_units("x"), "'dataset' must be an xarray.Dataset"),
         (lambda r: Scene().with_segment(None), "segment must be a rsfstudy.Segment"),
         (
             lambda r: rsfstudy.protocol([{"velocity": 2.0}]).locate_load_point_reversal(9),
             "index = 9 is out of",
         ),
-        (lambda r: Figure(panels=int), "panels must be a list"),
-        (lambda r: Panel(x=5), "x must be a string or a function"),
-        (lambda r: Panel(hue="law"), "hue must be a list"),
-        (lambda r: Panel(log="z"), "log must contain only x and y"),
+        (lambda r: Figure(panels=int), "'panels' must be a list"),
+        (lambda r: Panel(x=5), "'x' must be a string or a function"),
+        (lambda r: Panel(hue="law"), "'hue' must be a list"),
+        (lambda r: Panel(log="z"), "'log' must contain only x and y"),
         (lambda r: Segment("a"), "load_velocity must be a number"),
         (
             lambda r: ClosedFormRatio("z", of="x", form=np.ones(3)),
-            "form must be a string .got array",
+            "'form' must be a string .got array",
         ),
-        (lambda r: LinearFit("z", of=None, on="x"), "of must be a string"),
+        (lambda r: LinearFit("z", of=None, on="x"), "'of' must be a string"),
         (
             lambda r: reductions.apply_reductions(r, ()),
-            "dataset must be an xarray.Dataset .got Record",
+            "'dataset' must be an xarray.Dataset .got Record",
         ),
         (lambda r: rsfstudy.run("a" * 300), "study 'aaa.*at most 255 bytes"),
         (
             lambda r: rsfstudy.history({"time": [0, 1], "velocity": "="}),
-            "velocity must be a list of numbers .got '='",
+            "'velocity' must be a list of numbers .got '='",
         ),
         (lambda r: study_of("s", LinearStability(), Axis("a", [0.1])).scene(-1), "number = -1 is"),
-        (lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}), "time must have one dim"),
-        (lambda r: rsfstudy.Accuracy().with_rtol(np.timedelta64(1)), "rtol must be a number"),
+        (
+            lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}),
+            "'time' must have one dim",
+        ),
+        (lambda r: rsfstudy.Accuracy().with_rtol(np.timedelta64(1)), "'rtol' must be a number"),
         (
             lambda r: Rig(normal_stress=None, slip_distance=1e-5, reference_velocity=1e-6),
             "normal_stress is required",
@@ -165,9 +171,12 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
             ),
             "stiffness_ratio = 5e-324 is so small",
         ),
-        (lambda r: Scene(a=np.timedelta64(1, "s")), "a must be a number"),
-        (lambda r: Axis("a", [0.1]).with_rows(np, {}), "rows must be a list.*got <module 'numpy'"),
-        (lambda r: Figure(panels=np.ndarray), "panels must be a list .got <class"),
+        (lambda r: Scene(a=np.timedelta64(1, "s")), "'a' must be a number"),
+        (
+            lambda r: Axis("a", [0.1]).with_rows(np, {}),
+            "'rows' must be a list.*got <module 'numpy'",
+        ),
+        (lambda r: Figure(panels=np.ndarray), "'panels' must be a list .got <class"),
         (lambda r: rsfstudy.read_table(STEP, {"time": 5}), "column must be a heading, or"),
         (
             lambda r: rsfstudy.read_table(STEP, {"time": []}),
@@ -180,7 +189,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         ),
         (
             lambda r: reductions.Mean("z", of="x").compute(ARRAY),
-            "of = .*has no dimension 'sample'. Ch",
+            "'of' has no dimension 'sample' .got <DataArray>.. Ch",
         ),
         (lambda r: PowerLaw("z", of="x", on="y").centre_values(ARRAY, "y"), "has no dimension 'y'"),
         (
@@ -189,7 +198,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         ),
         (
             lambda r: rsfstudy.run("rate_step_boundary", alpha=[{}], output=None, workers=0),
-            "alpha must be a number, a string",
+            "'alpha' must be a number, a string",
         ),
     ],
 )

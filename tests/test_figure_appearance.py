@@ -85,7 +85,7 @@ def test_panels_are_below_each_other_in_a_narrow_figure(results):
     [
         (
             "20 mm",
-            "width must be from 60 mm to 600 mm \\(got '20 mm'\\). For example, pass '85 mm'",
+            "'width' must be from 60 mm to 600 mm \\(got '20 mm'\\). For example, pass '85 mm'",
         ),
         (85, "must be from 60 mm to 600 mm"),
         ("3 s", "has units that are incompatible with m"),

@@ -90,7 +90,7 @@ def test_what_reads_back_differently_is_not_put_in_place(tmp_path, monkeypatch):
     monkeypatch.setattr(
         dataset_files, "encoding_without_fill_values", lambda _d: {"v": {"dtype": "float32"}}
     )
-    with pytest.raises(DataError, match="read back differ"):
+    with pytest.raises(DataError, match="stored data differ"):
         dataset_files.write_dataset(dataset(0.1), path)
     assert os.listdir(tmp_path) == []
 

@@ -79,5 +79,5 @@ def test_what_has_no_end_is_refused():
         simulate(SCENES["mass"], duration=1.0, start=motion)
     with pytest.raises(InvalidValue, match="must be a complete motion"):
         simulate(scene, duration=1.0, start=motion.drop_attrs())
-    with pytest.raises(InvalidValue, match="must increase from 1 or later"):
+    with pytest.raises(InvalidValue, match="increasing finite numbers that begins at 1 or later"):
         simulate(scene, times=[0.5, 2.0], start=motion)

@@ -74,11 +74,11 @@ def test_paths_are_refused_by_a_rule(words, message, tmp_path, monkeypatch):
     [
         (
             f"simulate --budget {10**30}",
-            "budget must be a whole",
+            "'budget' must be a whole",
         ),
         (f"run rate_step_boundary --serial --budget {10**16}", "from 1 to 1,000,000,000,000,000"),
-        (f"fit record.csv --step 1 --windows {10**12}", "windows must be a whole"),
-        (f"fit record.csv --step 1 --posterior {10**12}", "posterior must be a"),
+        (f"fit record.csv --step 1 --windows {10**12}", "'windows' must be a whole"),
+        (f"fit record.csv --step 1 --posterior {10**12}", "'posterior' must be a"),
     ],
 )
 def test_numbers_are_bounded_before_memory_is_allocated(words, message, tmp_path, monkeypatch):

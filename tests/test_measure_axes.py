@@ -134,7 +134,8 @@ def test_a_field_that_decides_the_shape_is_refused():
     })  # fmt: skip
     assert scaled(Axis("factor", [1.0, 2.0]), measure=kind()).shape == (2, 2)
     with pytest.raises(
-        InvalidValue, match="'times': changes which results.*Create a separate study for each"
+        InvalidValue,
+        match="axis 'times' determines which results.*Create a separate study for each",
     ):
         scaled(Axis("times", [1.0, 2.0]), measure=kind())
 
@@ -179,7 +180,7 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
     assert rsfstudy.check(run(declared.with_(direction="up"))).verdict.tolist() == [
         "not applicable"
     ]
-    with pytest.raises(InvalidValue, match="is not a point of the lattice, in claim X1"):
+    with pytest.raises(InvalidValue, match="claim X1: 'where' must be a point of the lattice"):
         run(replace(declared, claims=[replace(claim, where={"direction": "left"})]))
 
 

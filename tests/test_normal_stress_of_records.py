@@ -118,5 +118,8 @@ def test_a_normal_stress_that_is_not_compressive_is_refused() -> None:
     record = record_at(8.0, 1, "negative")
     columns = {**record.columns, "normal_stress": -1e-6 * record.columns["normal_stress"]}
     negative = rsfstudy.read_record(columns).with_steps([(40.0, 40.0, 1.0, 10.0)])
-    with pytest.raises(InvalidValue, match=r"normal_stress = -8000000.*reverse the sign"):
+    with pytest.raises(
+        InvalidValue,
+        match=r"normal_stress must be positive before step 1.*-8000000.*reverse the sign",
+    ):
         rsfstudy.fit(negative, **OPTIONS)

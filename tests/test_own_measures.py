@@ -128,7 +128,7 @@ def test_a_measure_states_its_outputs_once(tmp_path):
 )  # fmt: skip
 def test_inner_coordinates_that_are_none(values):
     with pytest.raises(
-        InvalidValue, match="x = |measure = 'Own': declares outputs that a lattice cannot"
+        InvalidValue, match="^'x' must |^measure = 'Own' declares outputs that cannot be stored"
     ):
         study(along(values))
 

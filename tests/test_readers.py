@@ -346,13 +346,13 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"rows": (0, 5)}, "rows must be the numbers of the first and the last row"),
-        ({"rows": (5, 3)}, "rows must be"),
-        ({"rows": (500, 600)}, "selects no rows of the record, which has 40 rows"),
+        ({"rows": (0, 5)}, "'rows' must be the numbers of the first and the last row"),
+        ({"rows": (5, 3)}, "'rows' must be"),
+        ({"rows": (500, 600)}, "must contain at least one of the 40 rows of the record"),
         ({"begin": "2 MPa"}, "begin = '2 MPa' is neither a time nor a displacement"),
         ({"begin": "x"}, "begin = 'x' is neither a time nor a displacement"),
         ({"begin": "1 h"}, "begin = '1 h' is outside the record, which covers 0 to 9.75 s"),
-        ({"thin": 0}, "thin must be a whole number, 1 or more"),
+        ({"thin": 0}, "'thin' must be a whole number, 1 or more"),
         ({"filter": "median 1 s"}, "filter = 'median 1 s' is unknown. .*mean, trailing_mean"),
         (
             {"filter": "mean 20 s"},
@@ -413,11 +413,13 @@ def test_a_force_needs_the_area(tmp_path: Path) -> None:
     header = HEADER.replace("Shear stress (MPa)", "Force (kN)")
     (tmp_path / "run.csv").write_text(lines_of(",", header))
     for read in (rsfstudy.read_record, rsfstudy.events):
-        with pytest.raises(InvalidValue, match=r"contains a force .got 'kN'.*area='25 cm2'"):
+        with pytest.raises(
+            InvalidValue, match=r"must be a stress, not a force .got 'kN'.*area='25 cm2'"
+        ):
             read(tmp_path / "run.csv")
     record = rsfstudy.read_record(tmp_path / "run.csv", area="5 cm2")
     np.testing.assert_allclose(record.columns["friction"], 2.0 * FRICTION, rtol=1e-11)
-    with pytest.raises(InvalidValue, match="area must be positive"):
+    with pytest.raises(InvalidValue, match="'area' must be positive"):
         rsfstudy.read_record(tmp_path / "run.csv", area="0 cm2")
 
 
@@ -498,7 +500,7 @@ def test_events_of_stress_against_displacement() -> None:
         np.testing.assert_allclose(1e3 * found[name], expected, rtol=1e-6, atol=1e-9)
         assert found[name].units == "mm"
         assert "time" not in found[name].long_name
-    with pytest.raises(InvalidValue, match="displacement must increase.*without time requires"):
+    with pytest.raises(InvalidValue, match="'displacement' must increase.*without time requires"):
         rsfstudy.events({**data, "Displacement (mm)": -MADE.time})
 
 

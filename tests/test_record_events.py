@@ -60,7 +60,7 @@ def test_the_sign_of_shear_stress() -> None:
     centred = rsfstudy.events(time=made.time, shear_stress=-shifted, sign=-1)
     np.testing.assert_allclose(centred.time, positive.time, atol=1e-9)
     assert rsfstudy.events(time=made.time, shear_stress=shifted).sizes["event"] == len(made.begins)
-    with pytest.raises(InvalidValue, match="sign = 2 is unknown"):
+    with pytest.raises(InvalidValue, match="'sign' must be 1 or -1"):
         rsfstudy.events(time=made.time, shear_stress=shifted, sign=2)
 
 

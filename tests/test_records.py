@@ -115,13 +115,13 @@ def test_types_of_arrays_tell_what_they_are() -> None:
         record = rsfstudy.read_record(pd.DataFrame({**plain, "Time (min)": times}))
         np.testing.assert_allclose(record.time, TIME, atol=1e-9)
     masked = np.ma.masked_where(np.arange(len(MOVED)) == 3, MOVED)
-    with pytest.raises(InvalidValue, match="sample 4: displacement must be a finite number"):
+    with pytest.raises(InvalidValue, match="sample 4: 'displacement' must be a finite number"):
         rsfstudy.read_record({**plain, "LP (um)": masked})
     with pytest.raises(
         InvalidValue, match="displacement = '1 s' has units that are incompatible with"
     ):
         rsfstudy.read_record({**plain, "LP (um)": intervals})
-    with pytest.raises(InvalidValue, match="friction must be real numbers"):
+    with pytest.raises(InvalidValue, match="'friction' must be real numbers"):
         rsfstudy.read_record({**plain, "mu": FRICTION + 0j})
 
 
@@ -197,7 +197,7 @@ def test_a_binary_file_of_xlook(tmp_path: Path) -> None:
     plain = rsfstudy.read_record(path, by_text)
     np.testing.assert_allclose(plain.columns["displacement"], bits, rtol=1e-6)
     with pytest.raises(
-        InvalidValue, match="friction must have 4 samples, as many as time .got .1,"
+        InvalidValue, match="'friction' must have 4 samples, as many as 'time' .got .1,"
     ):
         rsfstudy.read_record(path, {**chosen, "friction": ("rest", "1")})
     with pytest.raises(
@@ -235,10 +235,10 @@ def test_slip_is_turned_into_displacement_of_the_load_point(
 
 def test_slip_without_stiffness_is_refused() -> None:
     arrays = {"time": TIME, "slip": MOVED, "friction": 0.6 + 0.0 * TIME}
-    with pytest.raises(InvalidValue, match=r"slip requires a stiffness.*read_record"):
+    with pytest.raises(InvalidValue, match=r"'slip' requires a stiffness.*read_record"):
         rsfstudy.read_record(arrays)
     with pytest.raises(InvalidValue, match=r"stiffness = '0.04 MPa/um' requires a normal stress"):
         rsfstudy.read_record(arrays, stiffness="0.04 MPa/um")
     for wrong in (-1.0, 0.0, "0 1/um"):
-        with pytest.raises(InvalidValue, match=r"stiffness must be positive"):
+        with pytest.raises(InvalidValue, match=r"'stiffness' must be positive"):
             rsfstudy.read_record(arrays, stiffness=wrong)

@@ -28,7 +28,7 @@ def test_a_scene_accepts_b():
     [
         ({"b": 0.013}, "b = 0.013 requires a, because scenes contain b/a. Pass a as well"),
         ({"a": 0.01, "b": 0.013, "b_over_a": 1.3}, "cannot be combined with b_over_a"),
-        ({"a": 0.01, "b": "5 MPa"}, "b must be a number without units"),
+        ({"a": 0.01, "b": "5 MPa"}, "'b' must be a number without units"),
         ({"a": 0.01, "b": "large"}, "is not a quantity"),
     ],
 )

@@ -92,7 +92,7 @@ def test_the_first_samples_are_a_sample_still():
     assert not whole.with_(a=0.012).axes[0].sampling_info
     with pytest.raises(InvalidValue, match="sample = 16.0 is not a point .* from 0 to 15"):
         whole.with_(sample=16)
-    with pytest.raises(InvalidValue, match="a = .*must be a single value for all points"):
+    with pytest.raises(InvalidValue, match="'a' varies .*must be a single value for all points"):
         whole.with_(a=[0.01, 0.02])
 
 
@@ -322,7 +322,7 @@ def test_too_few_samples_for_a_quantile():
     assert np.isnan(found["q"])
     assert found["q"].attrs["refused"] == "requires at least 19 samples with a value"
     for level in (1.0, "half"):
-        with pytest.raises(InvalidValue, match="level must be between 0 and 1"):
+        with pytest.raises(InvalidValue, match="'level' must be between 0 and 1"):
             Quantile("q", "y", level=level)
     with pytest.raises(InvalidValue, match="over = 'draw' is not a dimension of y"):
         apply_reductions(measured(np.arange(18.0)), (Mean("m", "y", over="draw"),))

@@ -42,7 +42,7 @@ def written(tmp_path, text: str) -> str:
         ("x = 1\nx +", "line 2: invalid syntax"),
         ("\n\n1 / 0", "raises ZeroDivisionError, line 3: division by zero"),
         ("from rsfstudy import Scene\nScene(alfa=1)", "line 2: 'alfa'"),
-        ("from rsfstudy import Scene\nScene(a=-1)", "line 2: a must be greater than 0"),
+        ("from rsfstudy import Scene\nScene(a=-1)", "line 2: 'a' must be greater than 0"),
         ("raise SystemExit('no')", "raises SystemExit, line 1: no"),
     ],
 )

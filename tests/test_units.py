@@ -192,7 +192,7 @@ def test_long_texts_are_read_in_linear_time(tmp_path):
     for header in (f"velocity ({blanks}x", f"velocity{blanks}x", f"{blanks}velocity (um/s{blanks}"):
         path.write_text(f"{header}\n1\n")
         with pytest.raises(
-            InvalidValue, match="at most 200 char|has 1 fields|is not a column name"
+            InvalidValue, match="at most 200 char|has 1 fields|does not consist of a name and units"
         ):
             read_protocol(path, RIG)
     for text in (f"5 Pa{blanks}!", "1" * 50_000 + "!", "5 " + "m" * 50_000 + "!"):

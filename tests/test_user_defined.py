@@ -55,7 +55,7 @@ def test_a_reduction_needs_no_more_than_a_call(tmp_path):
     assert dataset.largest == dataset.critical_stiffness.max()
     kinds = [one["kind"] for one in declaration_of(dataset)["reductions"]]
     assert kinds == ["Largest", "HalfSlope"]
-    with pytest.raises(InvalidValue, match="reduction = .Largest. is not part of rsfstudy"):
+    with pytest.raises(InvalidValue, match="reduction .Largest. is not part of rsfstudy"):
         _ = rsfstudy.open(tmp_path / "reducing.nc").rsf.study
 
 
@@ -69,7 +69,9 @@ def test_a_reduction_that_returns_no_dataset_is_refused():
         def __call__(self, dataset):
             return dataset[self.of].max()
 
-    with pytest.raises(InvalidValue, match=r"result of Array = 'DataArray'.*self\.results"):
+    with pytest.raises(
+        InvalidValue, match=r"result of Array must return .*'DataArray'.*self\.results"
+    ):
         run(reducing(Array("largest", of="critical_stiffness")))
 
 
@@ -90,7 +92,9 @@ def test_a_reduction_that_returns_no_dataset_is_refused():
     ],
 )
 def test_an_unknown_keyword_is_reported_with_the_valid_ones(kind, wrong, meant):
-    with pytest.raises(TypeError, match=rf"{kind.__name__}\(\) has no parameter .* It takes \w+"):
+    with pytest.raises(
+        TypeError, match=rf"{kind.__name__}\(\) has no parameter .* Parameters: \w+"
+    ):
         kind(**wrong)
     if meant:
         with pytest.raises(TypeError, match=f"Did you mean '{meant}'"):
@@ -216,7 +220,10 @@ def test_several_motions_of_one_integrator_report_their_own_work():
     motions = [rsfstudy.simulate(scene, integrator=integrator) for _ in range(2)]
     first, second = (motion.attrs["rhs_evaluations"] for motion in motions)
     assert first == second == integrator.evaluations / 2
-    with pytest.raises(InvalidValue, match="must be an Integrator. Pass integrator=integrator"):
+    with pytest.raises(
+        InvalidValue,
+        match="'integrator' must be an Integrator .got Accuracy.*. Pass integrator=integrator",
+    ):
         rsfstudy.simulate(scene, integrator=Accuracy())
 
 

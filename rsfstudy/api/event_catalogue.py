@@ -251,7 +251,7 @@ def events(
     moves = None if moved is None else _check_record_samples("displacement", moved)
     for name, samples in (("shear_stress", stress), ("displacement", moves)):
         if samples is not None and len(samples) != len(times):
-            rule = f"must have {len(times)} samples, as many as time"
+            rule = f"must have {len(times)} samples, as many as 'time'"
             raise InvalidValue(name, len(samples), rule)
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
@@ -315,7 +315,7 @@ def _parse_stiffness(stiffness: Any, variable_attributes: Mapping[str, Mapping[A
             variable_attributes[n].get("units") for n in ("shear_stress", "displacement")
         )
         if not (stress and length):
-            remedy = "Pass a number in the units of the record."
+            remedy = "Pass a number in the units of shear stress divided by displacement."
             raise InvalidValue(
                 "stiffness",
                 stiffness,
@@ -375,7 +375,7 @@ def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:
     if stated_sign is None:
         return -1.0 if stress.max() < 0.0 else 1.0
     if stated_sign not in (-1, 1):
-        raise InvalidValue("sign", stated_sign, "is unknown", choices=("1", "-1"))
+        raise InvalidValue("sign", stated_sign, "must be 1 or -1")
     return float(stated_sign)
 
 

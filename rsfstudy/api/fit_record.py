@@ -281,7 +281,7 @@ def fit(
     for one in records:
         if not isinstance(one, Record):
             remedy = "Read a record with rsfstudy.read_record."
-            raise InvalidValue("record", one, "is not a record", remedy=remedy)
+            raise InvalidValue("record", one, "must be a Record", remedy=remedy)
     records = tuple(_add_normal_stress_of_rig(one, rig) for one in records)
     numbers = _select_step_numbers(records, steps)
     guess = _guess_slip_distance(records[0], rig, numbers[0], slip_distance)
@@ -376,7 +376,7 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
         if not 1 <= number <= count:
-            rule = f"must be the number of a step, from 1 to {count}"
+            rule = f"must contain step numbers from 1 to {count}"
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:
@@ -547,7 +547,7 @@ def _free_parameters(
     shared = tuple(name for name in free if any(name in names for names in own.values()))
     for name in stated_parameters:
         if name not in shared:
-            rule = f"is not a parameter with {' or '.join(f'law={law!r}' for law in laws)}"
+            rule = f"must only contain parameters of {' or '.join(f'law={law!r}' for law in laws)}"
             remedy = (
                 _REMEDY_FOR_WRONG_STATE_PARAMETERS
                 if name in (*_EVOLUTION_EFFECT_PARAMETERS, "slip_distance_2")
@@ -571,7 +571,7 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
     is empty if the user passes neither ``averaging`` nor ``low_pass``.
     """
     if averaging is not None and low_pass:
-        remedy = "Pass `averaging=` or `low_pass=`."
+        remedy = "Pass either averaging= or low_pass=, not both."
         raise InvalidValue("low_pass", low_pass, "cannot be combined with averaging", remedy=remedy)
     if averaging is not None:
         kind, size = MEAN, averaging
@@ -608,7 +608,9 @@ def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
         )
     if len({record.filter for record in records}) > 1:
         remedy = "Read all records with the same filter=, or fit them separately."
-        raise InvalidValue("filter", sorted(filters), "differs between the records", remedy=remedy)
+        raise InvalidValue(
+            "filter", sorted(filters), "must be the same for all records", remedy=remedy
+        )
     return filters.pop()
 
 

@@ -73,7 +73,7 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
         table, name = measure_motion_holds(record), "motion"
     else:
         remedy = "Pass a record from rsfstudy.read_record, the path of its file, or a motion."
-        raise InvalidValue("record", record, "is not a record", remedy=remedy)
+        raise InvalidValue("record", record, "must be a record or a motion", remedy=remedy)
     if not table.sizes["hold"]:
         remedy = "If the steps are not detected, specify them: record.with_steps([...])."
         rule = "has no hold of the load point between sliding and reloading"
@@ -101,11 +101,8 @@ def measure_motion_holds(motion: xr.Dataset) -> xr.Dataset:
     """
     for name in ("time", *_MOTION_VARIABLES):
         if name not in motion or motion[name].dims != ("time",):
-            text = (
-                "is missing, or does not have the dimension time. Pass a motion from "
-                "rsfstudy.simulate"
-            )
-            raise DataError(f"{name} {text}")
+            reason = "does not have the dimension time" if name in motion else "is missing"
+            raise DataError(f"{name} {reason}. Pass a motion from rsfstudy.simulate.")
     time, values = motion["time"].values, np.column_stack([motion[n] for n in _MOTION_VARIABLES])
     rows = InterpolatedMotionRows(time, values, 0.0)
     least = _MIN_FALL_AFTER_PEAK_OVER_RTOL * float(motion.attrs.get("rtol", 0.0))

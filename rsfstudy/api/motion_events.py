@@ -65,10 +65,8 @@ def find_motion_events(
     names = ("time", "log10_slip_rate", "slip", "shear_stress")
     for name in names:
         if name not in motion or motion[name].dims != ("time",):
-            raise DataError(
-                f"{name} is missing, or does not have the dimension time. Pass a motion from "
-                "rsfstudy.simulate"
-            )
+            reason = "does not have the dimension time" if name in motion else "is missing"
+            raise DataError(f"{name} {reason}. Pass a motion from rsfstudy.simulate.")
     times, *rest = (np.asarray(motion[name], dtype=float) for name in names)
     arrest = _arrest_level(motion, scene)
     if slip_rate is None:

@@ -198,7 +198,9 @@ def simulate(
     array([0.5841, 0.5901, 0.59  ])
     """
     if extra_positional_arguments:
-        remedy = f"Write duration={shorten_text(extra_positional_arguments[0])}, in D_c/V_*."
+        remedy = (
+            f"Write duration={shorten_text(extra_positional_arguments[0])}, in units of D_c/V_*."
+        )
         raise InvalidValue(
             "optional arguments of simulate",
             extra_positional_arguments[0],
@@ -215,7 +217,8 @@ def simulate(
     known = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
     if not (known and 0.0 < duration < math.inf):
         remedy = (
-            "Pass the duration in D_c/V_*. To convert a duration with units, use rig.dimensionless."
+            "Give the duration in units of D_c/V_*. To convert a duration in other units, use "
+            "rig.dimensionless."
         )
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
     is_alone = integrator is None
@@ -459,10 +462,12 @@ def _check_requested_times(
     if times is None:
         return None
     if duration is not None:
-        raise InvalidValue("duration", duration, "cannot be combined with times")
+        raise InvalidValue(
+            "duration", duration, "cannot be combined with times. Pass either duration or times"
+        )
     given = np.array(times, dtype=object)
     if not all(isinstance(time, Real) and not isinstance(time, bool) for time in given.flat):
-        raise InvalidValue("times", times, "must be numbers, in D_c/V_*")
+        raise InvalidValue("times", times, "must contain numbers, in units of D_c/V_*")
     at = given.astype(float)
     right = (
         at.ndim == 1
@@ -472,7 +477,10 @@ def _check_requested_times(
         and at[-1] > start_time
     )
     if not right or not (np.diff(at) > 0.0).all():
-        rule = f"must be finite and increasing, and must not begin before {start_time:g}"
+        rule = (
+            f"must be a one-dimensional list of increasing finite numbers that begins at "
+            f"{start_time:g} or later"
+        )
         raise InvalidValue("times", times, rule)
     return at
 
@@ -526,4 +534,4 @@ def check_scene(value: object) -> None:
     """
     if not isinstance(value, Scene):
         remedy = "Create a scene with rsfstudy.Scene(...). For studies, use rsfstudy.run."
-        raise InvalidValue("scene", value, "is not a scene", remedy=remedy)
+        raise InvalidValue("scene", value, "must be a Scene", remedy=remedy)

@@ -61,8 +61,10 @@ def check_storable_text(argument_name: str, text: object) -> None:
     InvalidValue
         If the value is not a string, contains a null character, or cannot be encoded as UTF-8.
     """
-    if not isinstance(text, str) or "\0" in text:
+    if not isinstance(text, str):
         raise InvalidValue(argument_name, text, "must be a string")
+    if "\0" in text:
+        raise InvalidValue(argument_name, text, "must be a string without the null character")
     try:
         text.encode()
     except UnicodeError as error:
@@ -90,7 +92,8 @@ def to_plain_value(field_name: str, value: Any) -> Any:
     Raises
     ------
     InvalidValue
-        If the value is an array with one or more dimensions.
+        If the value is an array with one or more dimensions, or an integer that is too large for a
+        floating-point number.
     """
     value = SceneFields.normalise_value(field_name, value)
     if isinstance(value, np.ndarray) and value.ndim:
@@ -98,7 +101,9 @@ def to_plain_value(field_name: str, value: Any) -> Any:
     value = value.item() if isinstance(value, np.generic | np.ndarray) else value
     if not isinstance(value, int) or isinstance(value, bool):
         return value
-    return float(value) if abs(value) < 2**1023 else math.inf
+    if abs(value) >= 2**1023:
+        raise InvalidValue(field_name, value, "is too large for a floating-point number")
+    return float(value)
 
 
 @accept_former_keyword_names
@@ -167,7 +172,7 @@ class Axis:
         """Create an axis from values or points."""
         if not is_variable_name(dimension):
             rule = "must be a Python identifier in Unicode normalisation form NFC"
-            raise InvalidValue("axis", dimension, rule)
+            raise InvalidValue("axis name", dimension, rule)
         labels: tuple[str, ...] | None = None
         if (
             isinstance(values, Mapping)
@@ -476,12 +481,12 @@ def _rows_from_columns(
     """Create the rows of an axis with numbered points from lists of values."""
     lengths = {name: len(column) for name, column in values_by_field.items()}
     for name, length in lengths.items():
-        if not is_variable_name(name) or name == dimension:
-            rule = (
-                "must be the name of a field, and must differ from the name of the axis, "
-                f"{dimension!r}"
-            )
-            raise InvalidValue("column", name, rule)
+        if not is_variable_name(name):
+            raise InvalidValue("column", name, "does not have the name of a field")
+        if name == dimension:
+            rule = "has the name of the axis"
+            remedy = "Rename the column or the axis."
+            raise InvalidValue("column", name, rule, remedy=remedy)
         if length != max(lengths.values()):
             raise InvalidValue("columns", lengths, "must have the same length")
     made = [

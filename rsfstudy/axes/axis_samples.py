@@ -107,7 +107,7 @@ def _check_sampling_arguments(
         raise InvalidValue("n", sample_count, f"must be at most {MAX_ITEMS_OF_LIST_ARGUMENT:,}")
     if method in _SOBOL_METHODS and sample_count & (sample_count - 1):
         below = 1 << (int(sample_count).bit_length() - 1)
-        rule = "must be a power of two, because other numbers of Sobol points are not balanced"
+        rule = "must be a power of two, because Sobol sequences are balanced only for powers of two"
         remedy = f"Use n={below} or n={2 * below}, or method='latin_hypercube'."
         raise InvalidValue("n", sample_count, rule, remedy=remedy)
     for name, drawn in distributions.items():
@@ -136,8 +136,8 @@ def _compute_sds_and_correlation_matrix(
         given = np.empty(0)
     if given.shape != (count, count) or not np.isfinite(given).all():
         rule = (
-            f"must be a {count} by {count} matrix of finite numbers, whose rows and columns "
-            f"have the order {', '.join(distributions)}"
+            f"must be a {count} by {count} matrix of finite numbers, with rows and columns in "
+            f"the parameter order ({', '.join(distributions)})"
         )
         raise InvalidValue("covariance", covariance, rule)
     variances = np.diag(given)
@@ -147,7 +147,7 @@ def _compute_sds_and_correlation_matrix(
     deviations = np.sqrt(variances)
     correlation = given / np.outer(deviations, deviations)
     if method == "saltelli" and not np.array_equal(correlation, np.eye(count)):
-        rule = "contains correlations, but Sobol indices require independent quantities"
+        rule = "must be diagonal, because Sobol indices require independent quantities"
         remedy = (
             "Use method='sobol', or sample independent quantities and compute the fields "
             "from them with fields=."
@@ -156,7 +156,7 @@ def _compute_sds_and_correlation_matrix(
     lowest = float(np.linalg.eigvalsh(correlation)[0])
     if lowest < -_EIGENVALUE_ROUNDING_ERROR * count:
         rule = (
-            "is not positive semidefinite, because its correlation matrix has the eigenvalue "
+            "must be positive semidefinite, but its correlation matrix has the eigenvalue "
             f"{lowest:.2g}"
         )
         raise InvalidValue("covariance", given.tolist(), rule)
@@ -315,7 +315,7 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         If the object is not a table, if a column occurs twice, or if units contradict each other.
     """
     if not hasattr(table, "keys") or getattr(table, "ndim", 2) != 2 or not len(table):
-        rule = "is not a table with named columns"
+        rule = "must have named columns"
         remedy = "Pass a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
         raise InvalidValue("table", table, rule, remedy=remedy)
     found: dict[str, Any] = {}

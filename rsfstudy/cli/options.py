@@ -183,7 +183,7 @@ json_option = click.option(
 study_name_or_all_argument = combine_option_decorators(
     click.argument("name", required=False),
     click.option(
-        "--all", "every", is_flag=True, help="Process all studies that the command list shows."
+        "--all", "every", is_flag=True, help="Process all studies that `rsfstudy list` shows."
     ),
 )
 output_option = make_output_option("Results directory.", Defaults.OUTPUT_DIRECTORY, file_okay=False)
@@ -194,7 +194,7 @@ set_values_option = click.option(
     metavar="AXIS=VALUES",
     help="Override an axis or a field. VALUES is a comma-separated list or a range "
     "(start:stop:count, or start:stop:count:log for logarithmic spacing). Values can have "
-    "units if the study has a rig. Values of the field loading can be paths of CSV files "
+    "units if the study has a rig. Values of the field 'loading' can be paths of CSV files "
     "with protocols or records. Example: --set hold_time='10 s,100 s'.",
 )
 rtol_option = click.option(
@@ -237,7 +237,7 @@ worker_options = combine_option_decorators(
         type=float,
         metavar="SECONDS",
         default=Defaults.CELL_TIME_LIMIT,
-        help="Maximum CPU time of a worker process for each cell, in seconds.",
+        help="Maximum CPU time per cell in a worker process, in seconds.",
     ),
     quiet_option,
 )
@@ -410,11 +410,11 @@ rig_options = combine_option_decorators(
 columns_option = click.option(
     "--columns",
     metavar="NAME=HEADING,...",
-    help="Columns of the record. NAME is time, displacement, slip, friction, shear_stress or "
-    "normal_stress. HEADING is a column heading or a column number, with units in "
-    "parentheses and an optional scale and offset. Examples: 'time=t (s),displacement=lp "
-    "(um),friction=mu', 'time=1 (s)' or 'displacement=lp (um) * 0.1 + 5'.  [default: all "
-    "columns with recognised headings]",
+    help="Columns of the record. NAME is 'time', 'displacement', 'slip', 'friction', "
+    "'shear_stress' or 'normal_stress'. HEADING is a column heading or a column number, with "
+    "units in parentheses and an optional scale and offset. Examples: 'time=t "
+    "(s),displacement=lp (um),friction=mu', 'time=1 (s)' or 'displacement=lp (um) * 0.1 + 5'."
+    "  [default: all columns with recognised headings]",
 )
 normal_stress_option = click.option(
     "--normal-stress",

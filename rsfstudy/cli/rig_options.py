@@ -32,7 +32,7 @@ MEANINGS_OF_RIG_OPTIONS = {
     "reference_velocity": "velocity of the load point before the test",
     "stiffness": "stiffness of the machine with its sample",
     "period": "period of free oscillation",
-    "mass": "mass per area of the fault",
+    "mass": "mass per unit fault area",
     "shear_modulus": "shear modulus of the medium",
     "density": "density of the medium",
     "thermal_diffusivity": "thermal diffusivity of the fault",

@@ -13,6 +13,7 @@ from rsfstudy.cli import cost_estimates
 from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult
 from rsfstudy.execution import CellPlan
+from rsfstudy.formatting import pluralize
 from rsfstudy.reporting import describe_scene_and_rig_fields
 from rsfstudy.rig import Rig
 
@@ -121,7 +122,9 @@ def print_study_declaration(declared: StudyDeclaration) -> None:
     )
     about = {
         **{
-            f"axis {axis.dimension} ({len(axis)})": _format_axis_points(axis.point_names)
+            f"axis {axis.dimension} ({pluralize(len(axis), 'value')})": _format_axis_points(
+                axis.point_names
+            )
             for axis in study.axes
         },
         **describe_scene_and_rig_fields(

@@ -39,7 +39,7 @@ def selected_study_names(options: CommandOptions) -> list[str]:
         If the user passed both a name and ``--all``, or neither of them.
     """
     if options.every == (options.name is not None):
-        raise click.UsageError("Pass the name of a study, or --all.")
+        raise click.UsageError("Pass either the name of a study or --all, not both.")
     return list(study_names()) if options.every else [options.name]
 
 

@@ -166,7 +166,7 @@ class CriticalStep(Measure):
             raise InvalidValue(
                 "of",
                 self.of,
-                "is not a step that the measure can compute",
+                "is not the name of a step that the measure can compute",
                 choices=STEP_FAMILY_BY_QUANTITY,
             )
         if self.direction not in STEP_DIRECTIONS:

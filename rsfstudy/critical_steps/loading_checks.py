@@ -34,7 +34,7 @@ def check_loading_is_single_step(scene: Scene) -> None:
     if len(loading.segments) > 1:
         rule = "is not a single step, so the stability after the step is not defined"
         remedy = (
-            "To find the peaks of the motion, use the measure step_response, or rsfstudy.simulate."
+            "To find the peaks of the motion, use the step_response measure or rsfstudy.simulate."
         )
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)
 

@@ -112,7 +112,7 @@ class WorkerPool(contextlib.ExitStack):
             raise InvalidValue("client", dask_client, "must be a distributed.Client")
         limit: object = cell_time_limit
         if not isinstance(limit, int | float) or not 0.0 < limit <= _MAX_TIME_LIMIT:
-            rule = f"must be a number greater than 0, up to {_MAX_TIME_LIMIT:g} s"
+            rule = f"must be a number greater than 0 and at most {_MAX_TIME_LIMIT:g} s"
             raise InvalidValue("time_limit", limit, rule)
         self.process_count, self.client, self.cell_time_limit, self._log_path = (
             process_count,

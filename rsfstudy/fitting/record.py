@@ -109,7 +109,7 @@ class Record:
                 raise InvalidValue("record", [*self.columns], rule, remedy=f"Pass {about.name}.")
         for name, values in self.columns.items():
             if values.shape != self.time.shape:
-                rule = f"must have {self.time.size} samples, as many as time"
+                rule = f"must have {self.time.size} samples, as many as 'time'"
                 raise InvalidValue(name, values.shape, rule)
             if not np.isfinite(values).all():
                 row = int(np.argmin(np.isfinite(values)))
@@ -365,8 +365,8 @@ def _parse_loading_step(step_fields: Sequence[float]) -> LoadingStep:
     if isinstance(step_fields, LoadingStep):  # Steps from another record are already valid.
         return step_fields
     rule = (
-        "is not a step. A step consists of the beginning, the end, the velocities before and "
-        "after, and optionally the "
+        "must consist of the beginning, the end, the velocities before and after, and "
+        "optionally the "
     )
     rule += "normal stresses before and after"
     try:

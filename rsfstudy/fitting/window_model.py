@@ -124,12 +124,16 @@ def check_free_parameters(free: Sequence[str]) -> None:
     rsfstudy.errors.InvalidValue: ...
     """
     if not free or len(set(free)) < len(free):
-        raise InvalidValue("free", tuple(free), "must be names of parameters without repetition")
+        raise InvalidValue("free", tuple(free), "must be a list of different parameter names")
     for name in free:
         if name not in PARAMETERS:
             remedy = f"Write {PARAMETER_SYNONYMS[name]}." if name in PARAMETER_SYNONYMS else ""
             raise InvalidValue(
-                "free", name, "is not a parameter", choices=PARAMETERS, remedy=remedy
+                "free",
+                name,
+                "must only contain names of parameters",
+                choices=PARAMETERS,
+                remedy=remedy,
             )
 
 

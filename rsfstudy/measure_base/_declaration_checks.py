@@ -106,7 +106,7 @@ def check_coordinate_values(name: str, values: Any) -> None:
         raise InvalidValue(
             name,
             values,
-            "contains a value twice, but the values of an inner dimension must be unique",
+            "must contain different values, because it is an inner dimension",
         )
 
 

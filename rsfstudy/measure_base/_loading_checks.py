@@ -49,6 +49,6 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
         rule = f"changes {what} continuously, so the motion neither settles nor repeats itself"
         remedy = (
             "Compute the motion with rsfstudy.simulate. For an example with an oscillation, "
-            "see the study resonance."
+            "run `rsfstudy show resonance`."
         )
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)

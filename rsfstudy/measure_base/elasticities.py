@@ -154,7 +154,7 @@ class Elasticities(Measure):
             not isinstance(self.measure, Measure)
             or self.measure.variables[self.measure.primary_output]
         ):
-            rule = "must be a measure whose primary output is a single number"
+            rule = "must be a Measure whose primary output is a single number"
             raise InvalidValue("measure", self.measure, rule)
         object.__setattr__(
             self,
@@ -164,11 +164,16 @@ class Elasticities(Measure):
         )
         for name in self.parameters:
             if name not in self._differentiable_parameter_names:
-                rule = f"is not a numeric field of the scene, or is computed by {self.measure.name}"
+                is_solved = name in self.measure.solved_fields
+                rule = (
+                    f"must not contain fields that {self.measure.name} computes"
+                    if is_solved
+                    else "must only contain numeric fields of the scene"
+                )
                 choices, remedy = (
                     ((), _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES)
                     if name in _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS
-                    else (self._differentiable_parameter_names, "")
+                    else (() if is_solved else self._differentiable_parameter_names, "")
                 )
                 raise InvalidValue("parameters", name, rule, choices=choices, remedy=remedy)
 

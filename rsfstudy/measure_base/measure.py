@@ -564,17 +564,19 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             choices=variables,
         )
     for name in names:
-        if (
-            not is_variable_name(name)
-            or name in RESERVED_NAMES - {*measure.solved_fields}
-            or names.count(name) > 1
-        ):
-            rule = "is reserved, is not unique or is not a valid variable name"
-            raise InvalidValue("variable", name, rule).with_location(f"measure {measure.name}")
+        kind, rule = "variable", ""
+        if not is_variable_name(name):
+            kind, rule = "variable name", "must be a Python identifier in normalisation form NFC"
+        elif name in RESERVED_NAMES - {*measure.solved_fields}:
+            rule = "has a reserved name"
+        elif names.count(name) > 1:
+            rule = "is declared more than once"
+        if rule:
+            raise InvalidValue(kind, name, rule).with_location(f"measure {measure.name}")
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
             raise InvalidValue(
-                "dimensions", dims, "must be names without repetition"
+                "dimensions", dims, "must be a tuple of different names"
             ).with_location(f"output {name}")
         for dim in dims:
             if dim not in measure.inner_coordinates:
@@ -588,12 +590,12 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
         if not isinstance(about, Quantity) or about.name not in known:
             odd = about.name if isinstance(about, Quantity) else about
             raise InvalidValue(
-                "quantities", odd, "does not describe an output of the measure", choices=known
+                "quantities", odd, "must describe outputs of the measure", choices=known
             )
     for name in measure.solved_fields:
         if name not in SceneFields.NAMES:
             raise InvalidValue(
-                "solved_fields", name, "is not a field of a scene", choices=SceneFields.NAMES
+                "solved_fields", name, "must contain scene fields", choices=SceneFields.NAMES
             )
 
 

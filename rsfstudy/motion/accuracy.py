@@ -100,7 +100,7 @@ class Accuracy:
                 "rtol",
                 self.rtol,
                 f"must lie between {MIN_RTOL:g} and {MAX_RTOL:g}",
-                remedy="Smaller values are below the rounding errors, and larger values do not "
+                remedy="Smaller values are below the rounding error, and larger values do not "
                 "resolve the motion.",
             )
         if not 1 <= self.budget <= MAX_EVALUATION_BUDGET or self.budget % 1:
@@ -109,7 +109,7 @@ class Accuracy:
         object.__setattr__(self, "budget", int(self.budget))
         object.__setattr__(self, "engine", engine_name(self.engine))
         if self.methods and self.engine != SCIPY:
-            rule = f"requires the engine 'scipy', but the engine is {self.engine!r}"
+            rule = f"must be empty if the engine is {self.engine!r}"
             raise InvalidValue(
                 "methods", self.methods, rule, remedy="Omit methods=, or use engine='scipy'."
             )

@@ -56,7 +56,7 @@ def compare_file_with_known_answer(
         raise InvalidValue(
             "problem",
             number,
-            "is not the number of a problem",
+            "is not a problem number",
             choices=map(str, there),
             remedy=remedy,
         )

@@ -46,7 +46,7 @@ def describe_scene_and_rig_fields(
     sizes = Rig.convert_quantities_for_display(rig_values, varied_names)
     told = {
         heading: format_nonempty_fields({n: v for n, v in scene_fields.items() if v}),
-        "fields equal to 0": ", ".join(
+        "fields with the value 0": ", ".join(
             n for n, v in scene_fields.items() if not v and v is not None
         ),
         "rig": format_nonempty_fields({n: f"{v:g} {units}" for n, (v, units) in sizes.items()}),

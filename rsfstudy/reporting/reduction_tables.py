@@ -32,10 +32,15 @@ _MAX_MISSING_POINTS_SHOWN = 4
 #: Columns of the comparison of integrators.
 _INTEGRATOR_COLUMNS = (
     Column("cheapest integrator", "cheapest_integrator", str, "integrator"),
-    Column("its evaluations", "cheapest_work", "{:,.0f}".format, "work"),
-    Column("evaluations of the default", "cheapest_default_work", "{:,.0f}".format, "default_work"),
+    Column("evaluations", "cheapest_work", "{:,.0f}".format, "work"),
     Column(
-        "rtol of the default",
+        "evaluations (default integrator)",
+        "cheapest_default_work",
+        "{:,.0f}".format,
+        "default_work",
+    ),
+    Column(
+        "rtol (default integrator)",
         "cheapest_default_request",
         lambda digits: f"{10.0**-digits:.1g}",
         "default_request",

@@ -269,6 +269,7 @@ def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:
     caption = f"Events {limit}"
     if count > len(rows):
         caption += (
-            f" ({len(rows)} of {count:,}; use dataset.rsf.events() for all events and their errors)"
+            f" (first {len(rows)} of {count:,} events; dataset.rsf.events() returns all events "
+            "and their errors)"
         )
     return TextTable(rows, caption)

@@ -145,7 +145,7 @@ def _convert_force(name: str, column: Column, area: Any) -> Column:
     if name not in _STRESS_COLUMNS or size is None or size[1] != _EXPONENTS_OF_FORCE:
         return column
     if area is None:
-        rule = "must contain a stress, but contains a force"
+        rule = "must be a stress, not a force"
         remedy = (
             "Pass the fault area, by which the force is divided: area='25 cm2' (--area '25 cm2')."
         )

@@ -123,19 +123,19 @@ def history(
         raise InvalidValue(
             "record",
             [*found],
-            "must contain the column time and at least one other column",
+            "must contain the column 'time' and at least one other column",
             remedy=remedy,
         )
     if "displacement" in found and "velocity" in found:
-        rule = "must not contain both displacement and velocity of the load point"
+        rule = "must contain either the displacement or the velocity of the load point, not both"
         raise InvalidValue("record", [*found], rule)
     sizes = {len(column.values) for column in found.values()}
     if len(sizes) > 1 or min(sizes) < 2:
         rule = (
-            f"has columns with {' and '.join(map(str, sorted(sizes)))} samples, but all columns "
-            "must have the same number of samples, at least 2"
+            "must have the same number of samples in all columns, at least 2 (got "
+            f"{' and '.join(map(str, sorted(sizes)))} samples in the columns {', '.join(found)})"
         )
-        raise InvalidValue("record", [*found], rule)
+        raise InvalidValue("record", ..., rule)
     values = {
         key: _convert_column_to_slider_units(key, column, rig) for key, column in found.items()
     }

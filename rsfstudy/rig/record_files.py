@@ -191,10 +191,9 @@ def _add_derived_columns(
     if "friction" not in record_values:
         stress = record_values.get("normal_stress")
         if stress is None:
+            rule = f"has no column for normal stress (columns: {', '.join(record_values)})"
             remedy = "Pass --normal-stress (normal_stress=), for example '20 MPa'."
-            raise InvalidValue(
-                "record", [*record_values], "contains no normal stress", remedy=remedy
-            )
+            raise InvalidValue("record", ..., rule, remedy=remedy)
         check_compression(stress)
         record_values["friction"] = record_values["shear_stress"] / stress
     if "displacement" not in record_values:

@@ -275,6 +275,7 @@ class Rig(HtmlTableMixin):
                     name,
                     fields[name],
                     f"cannot be combined with {RATIO_FIELD_BY_DIMENSIONAL_NAME[name]}",
+                    remedy="Omit one of the two.",
                 )
         fields = {
             RATIO_FIELD_BY_DIMENSIONAL_NAME.get(n, n): self._convert_to_scene_field(

@@ -48,7 +48,7 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
     ),
     "stiffness": RigQuantity("Pa/m", 1e4, 1e15, "$k$", "stiffness of the machine with its sample"),
     "period": RigQuantity("s", 1e-6, 1e3, "$T$", "period of free oscillation"),
-    "mass": RigQuantity("kg/m^2", 1e-2, 1e9, "$m$", "mass per area of the fault"),
+    "mass": RigQuantity("kg/m^2", 1e-2, 1e9, "$m$", "mass per unit fault area"),
     "shear_modulus": RigQuantity("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
     "density": RigQuantity("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
     "thermal_diffusivity": RigQuantity(
@@ -229,8 +229,8 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
         shear modulus and density is given, or if a quantity that shear heating requires is missing.
     """
     if "mass" in rig_values and "period" in rig_values:
-        rule = f"cannot be combined with period (got {rig_values['period']:g} s)"
-        raise InvalidValue("mass", rig_values["mass"], rule)
+        rule = f"cannot be combined with period = {rig_values['period']:g} s"
+        raise InvalidValue("mass", rig_values["mass"], rule, remedy="Omit one of the two.")
     if "mass" in rig_values and "stiffness" not in rig_values:
         remedy = "Pass stiffness= as well, or replace mass= by period=."
         raise InvalidValue(
@@ -252,7 +252,7 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
     missing = [n for n in HEAT_QUANTITIES if n not in rig_values]
     if given and missing:
         rule = (
-            f"requires {' and '.join(missing)}, because all of these quantities determine "
+            f"requires {', '.join(missing)}, because all of these quantities determine "
             "shear heating"
         )
         remedy = "Pass these quantities as well, or omit all quantities of shear heating."

@@ -79,7 +79,7 @@ class LatticeScenesOnRig:
                 if lacks and not {
                     AXIS_NAME_BY_RIG_NAME.get(name, name) for name in REQUIRED_QUANTITIES
                 } & set(lacks):
-                    rule = f"does not contain {lacks[0]}, which the rig of the study contains"
+                    rule = f"must contain {lacks[0]}, because the rig of the study contains it"
                     raise InvalidValue(
                         along.dimension, dict(row), rule, remedy="Pass it as an argument."
                     )

@@ -97,8 +97,8 @@ class RowSelection:
             last = min(last, self._find_row("end", self.end, columns))
         if first >= last:
             stated = {"rows": self.rows, "begin": self.begin, "end": self.end}
-            rule = f"selects no rows of the record, which has {count:,} rows"
-            raise InvalidValue("selection", stated, rule)
+            rule = f"must contain at least one of the {count:,} rows of the record"
+            raise InvalidValue("selected range", stated, rule)
         if (first, last) == (0, count):
             return dict(columns), []
         kept = slice(first, last)
@@ -173,7 +173,9 @@ class RowSelection:
         if chosen := parse_filter(self.filter):
             if "time" not in found:
                 remedy = "Omit the filter."
-                raise InvalidValue("filter", self.filter, "requires the column time", remedy=remedy)
+                raise InvalidValue(
+                    "filter", self.filter, "requires the column 'time'", remedy=remedy
+                )
             time = found["time"]
             kept = chosen.complete_rows(time)
             found |= {name: chosen.filter_rows(time, found[name]) for name in filtered_names}
@@ -218,6 +220,11 @@ def parse_filter(text: str) -> Filter | None:
     if kind not in FILTER_KINDS:
         remedy = "Pass, for example, 'mean 1 s' or 'butterworth_2 2 Hz'."
         raise InvalidValue("filter", text, "is unknown", choices=FILTER_KINDS, remedy=remedy)
+    if not size:
+        what = "a corner frequency" if kind in LOW_PASS_ORDERS else "an averaging time"
+        example = "2 Hz" if kind in LOW_PASS_ORDERS else "1 s"
+        rule = f"must contain {what} after the filter type"
+        raise InvalidValue("filter", text, rule, remedy=f"Pass, for example, '{kind} {example}'.")
     number = convert_to_si("filter", size, "1/s" if kind in LOW_PASS_ORDERS else "s")
     if not 0.0 < number < math.inf:
         raise InvalidValue("filter", text, "must have a positive size")

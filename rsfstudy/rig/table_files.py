@@ -107,8 +107,8 @@ def _choose_all_columns_of_header(
                 "In each heading, write the units in parentheses after the name, for "
                 f"example {EXAMPLE_OF_TABLE_HEADER}."
             )
-            rule = "is not a column name with units"
-            raise InvalidValue("header", heading, rule, remedy=remedy).with_location(
+            rule = "does not consist of a name and units"
+            raise InvalidValue("heading", heading, rule, remedy=remedy).with_location(
                 f"{table.location}, column {n}"
             )
         name, units = stated

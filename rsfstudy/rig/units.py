@@ -170,6 +170,8 @@ def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fra
     if isinstance(found, bool) or not isinstance(found, int | float | Fraction):
         remedy = f"Pass a number in {units}, or a string with units."
         raise InvalidValue(quantity_name, value, "is not a quantity", remedy=remedy)
+    if isinstance(value, int) and math.isinf(_to_float(found)):
+        raise InvalidValue(quantity_name, value, "is too large for a floating-point number")
     if not math.isfinite(_to_float(found)):
         raise InvalidValue(quantity_name, value, "must be finite")
     return Fraction(found)
@@ -269,7 +271,7 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
     scale, exponents = _multiply_known_units(powers)
     wanted = _multiply_known_units(_parse_unit_powers(units.removeprefix("1")) or [])[1]
     if exponents == (wanted[0], wanted[1] + 2, *wanted[2:]):
-        rule = "must contain a stress, but contains a force"
+        rule = "must be a stress, not a force"
         raise InvalidValue(quantity_name, text, rule, remedy="Divide the force by the fault area.")
     if exponents != wanted:
         raise _incompatible_units_error(quantity_name, text, units)
@@ -279,6 +281,9 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
 def _incompatible_units_error(quantity_name: str, value: Any, units: str) -> InvalidValue:
     if units == "1":
         return InvalidValue(quantity_name, value, "must be a number without units")
+    if isinstance(value, str) and not value.strip(" 0123456789.+-"):
+        remedy = f"Write the units after the number, for example '{value.strip()} {units}'."
+        return InvalidValue(quantity_name, value, "has no units", remedy=remedy)
     rule = f"has units that are incompatible with {units}"
     return InvalidValue(quantity_name, value, rule, remedy=f"Use {units} or multiples of {units}.")
 

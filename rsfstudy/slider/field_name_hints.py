@@ -140,7 +140,10 @@ def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) 
         Hint for the error message. The string is empty if there is no hint.
     """
     if slot_name == "normal_stress" and re.match(r"[\d.]", str(value)):
-        return _rig_quantity_hint("sigma_*", slot_name)
+        return (
+            "To set the value of the normal stress, pass Rig(normal_stress=...). In a study with "
+            "a rig, normal_stress can also be an axis or an override."
+        )
     if not isinstance(value, str):
         return ""
     plain = _normalise_name(value)

@@ -95,7 +95,7 @@ class SliderParameters(Part):
             raise self.field_error("initial_stress", rule)
         if self.initial_state and scene.parts.law.state_count > 1:
             rule = (
-                f"does not apply to {scene.parts.law.name}, because the law has several "
+                f"does not apply to law={scene.parts.law.name!r}, because the law has several "
                 "state variables"
             )
             remedy = "Omit initial_state, and use a loading protocol to reach the initial state."
@@ -126,6 +126,8 @@ def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
     """
     given = [name for name in ALTERNATIVE_STIFFNESS_FIELDS if name in field_values]
     if len(given) == 2:
-        rule = f"cannot be combined with stiffness_ratio (got {field_values['stiffness_ratio']:g})"
-        raise InvalidValue("stiffness", field_values["stiffness"], rule)
+        rule = f"cannot be combined with stiffness_ratio = {field_values['stiffness_ratio']:g}"
+        raise InvalidValue(
+            "stiffness", field_values["stiffness"], rule, remedy="Omit one of the two."
+        )
     return field_values if given else {**field_values, "stiffness_ratio": 1.0}

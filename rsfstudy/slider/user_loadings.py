@@ -173,8 +173,8 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
         remedy = "Read a file with rsfstudy.read_protocol."
         raise InvalidValue("protocol", segments, "must be a list of segments", remedy=remedy)
     if not segments:
-        remedy = 'Pass at least one segment, for example [{"velocity": 10}].'
-        raise InvalidValue("protocol", segments, "has no segments", remedy=remedy)
+        remedy = 'Pass, for example, [{"velocity": 10}].'
+        raise InvalidValue("protocol", segments, "must have at least one segment", remedy=remedy)
     history: list[Segment] = []
     for number, stated in enumerate(segments, start=1):
         before = history[-1].normal_stress if history else 0.0
@@ -202,7 +202,9 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
             return _build_validated_segment(*declared_segment)
         if not isinstance(declared_segment, Mapping):
             remedy = 'Write, for example, {"velocity": 10, "duration": 2}.'
-            raise InvalidValue("segment", declared_segment, "is not a segment", remedy=remedy)
+            raise InvalidValue(
+                "segment", declared_segment, "must be a mapping or a Segment", remedy=remedy
+            )
         for key in declared_segment:
             if key not in SEGMENT_MAPPING_KEYS:
                 raise InvalidValue("key", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)
@@ -224,8 +226,9 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
         if "distance" in declared_segment:
             distance = declared_segment["distance"]
             if "duration" in declared_segment:
-                rule = f"cannot be combined with distance (got {distance!r})"
-                raise InvalidValue("duration", duration, rule)
+                rule = f"cannot be combined with distance = {distance!r}"
+                remedy = "Omit one of the two."
+                raise InvalidValue("duration", duration, rule, remedy=remedy)
             distance = _read_positive_number(declared_segment, "distance", "positive and finite")
             duration = distance / _read_positive_number(
                 declared_segment, "velocity", "positive in a segment with a distance"
@@ -255,7 +258,7 @@ def _build_validated_segment(
     if not _is_number(step) or not math.isfinite(step):
         raise InvalidValue("step", step, "must be a finite number")
     if not _is_number(duration) or not duration > 0.0:
-        remedy = "Remove segments whose duration is zero."
+        remedy = "Remove segments with zero duration."
         raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
     if not _is_number(normal_stress) or not -1.0 < normal_stress < math.inf:
         rule = "must be greater than -1, because it is the imposed normal stress minus sigma_*"

@@ -44,7 +44,7 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
         values = dataset[dimension].values
         if dimension not in coordinate_values:
             if values.size > 1:
-                rule = f"does not select a value of {dimension}"
+                rule = f"must contain a value of {dimension}"
                 remedy = (
                     f"Pass one value for each axis (repeat --cell). The values of {dimension} are "
                     f"{format_list(values.tolist(), ', ')}."

@@ -69,7 +69,7 @@ def find_selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
         given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
         if given.size != 1:
             remedy = f"Select a cell first, for example dataset.isel({name}=0)."
-            raise InvalidValue(name, given.tolist(), "does not select a single cell", remedy=remedy)
+            raise InvalidValue(name, given.tolist(), "must have a single value", remedy=remedy)
         found = np.flatnonzero(values == given[0])
         if not found.size:
             remedy = "Use the dataset before its units were converted."

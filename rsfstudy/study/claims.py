@@ -131,18 +131,19 @@ class Claim:
                 rule = "must be a string"
                 raise self._invalid(name, getattr(self, name), rule)
         if self.relation not in CLAIM_RELATIONS:
-            raise InvalidValue("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
+            raise self._invalid("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
         if self.relation == "equals" and self.reason == TOLERANCE_REASON_OF_INEQUALITY:
-            rule = f"must explain the tolerance {self.tolerance}"
+            rule = f"must explain how the tolerance, {self.tolerance}, was chosen"
             raise self._invalid("reason", self.reason, rule)
         if self.expected not in _EXPECTED_VERDICTS:
-            raise InvalidValue(
-                "expected", self.expected, "is not a possible verdict", choices=_EXPECTED_VERDICTS
-            )
+            rule = "is not a possible verdict"
+            raise self._invalid("expected", self.expected, rule, choices=_EXPECTED_VERDICTS)
         for name in ("published", "tolerance"):
             value = getattr(self, name)
+            if isinstance(value, int) and not _is_number(value):
+                raise self._invalid(name, value, "is too large for a floating-point number")
             if not _is_number(value) or not math.isfinite(value):
-                raise self._invalid(name, value, "must be a number")
+                raise self._invalid(name, value, "must be a finite number")
         for name in ("where", "baseline"):
             if not isinstance(getattr(self, name), Mapping):
                 rule = "must be a mapping from coordinates to values"
@@ -150,7 +151,7 @@ class Claim:
             for value in getattr(self, name).values():
                 if not isinstance(value, str) and not _is_number(value):
                     rule = "must be strings or numbers"
-                    raise self._invalid(f"coordinate values in {name}", value, rule)
+                    raise self._invalid(f"coordinate values in {name!r}", value, rule)
 
     def _invalid(
         self, name: str, value: object, rule: str, *, choices: Iterable[str] = ()
@@ -224,7 +225,7 @@ class Claim:
                 rule = "is not a coordinate of the results"
                 raise self._invalid("where", name, rule, choices=sorted(coordinates))
         if self.verdict(dataset)[1] == NOT_APPLICABLE_VERDICT:
-            rule = "is not a point of the lattice"
+            rule = "must be a point of the lattice"
             raise self._invalid("where", {**self.where, **self.baseline}, rule)
 
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:

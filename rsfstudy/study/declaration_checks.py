@@ -53,7 +53,7 @@ def check_types(study_fields: Mapping[str, Any]) -> None:
             raise InvalidValue(name, given, f"must be a list of {kind.__name__} objects")
         for value in given if is_list else [given]:
             if not isinstance(value, kind) and not (name == "rig" and value is None):
-                rule = f"must be an object of the class {kind.__name__}"
+                rule = f"must be a {kind.__name__} object"
                 rule = f"must contain {kind.__name__} objects" if is_list else rule
                 raise InvalidValue(name, value, rule)
     if not study_fields["axes"]:
@@ -83,10 +83,12 @@ def check_name_clashes(
     measure.check()
     known = list(measure.variables)
     for reduction in reductions:
-        if not is_variable_name(reduction.name) or reduction.name in RESERVED_NAMES:
-            raise InvalidValue(
-                "reduction", reduction.name, "is reserved or is not a valid variable name"
-            )
+        if not is_variable_name(reduction.name):
+            rule = "must be a Python identifier, because it is a variable name"
+            raise InvalidValue("name of the reduction", reduction.name, rule)
+        if reduction.name in RESERVED_NAMES:
+            remedy = "Rename the reduction."
+            raise InvalidValue("reduction", reduction.name, "has a reserved name", remedy=remedy)
         if reduction.of not in known:
             raise InvalidValue(
                 "variable",
@@ -101,7 +103,7 @@ def check_name_clashes(
         for name in (axis.dimension, *axis.fields):
             if name in taken:
                 remedy = "Rename the result or the field of the axis."
-                raise InvalidValue("axis", name, "is already the name of a result", remedy=remedy)
+                raise InvalidValue("axis", name, "has the name of a result", remedy=remedy)
 
 
 def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:
@@ -185,7 +187,9 @@ def check_axis_fields(
     known = dict.fromkeys((*scene_field_names, *measure.plain_fields, *in_units))
     for axis in axes:
         if not axis.is_single_field and axis.dimension in (*scene_field_names, *axis.fields):
-            rule = "is the name of a field, so it cannot be the name of a zipped axis"
+            rule = (
+                "has the name of a field, but the name of a zipped axis must differ from all fields"
+            )
             raise InvalidValue("axis", axis.dimension, rule)
         if axis.units and scenes_on_rig is None:
             remedy = "Pass the rig to the study: Study(rig=rig)."
@@ -196,7 +200,7 @@ def check_axis_fields(
             if name not in known:
                 rule = (
                     "is neither a field of a scene nor a number, flag or string field of the "
-                    f"measure {measure.name}"
+                    f"{measure.name} measure"
                 )
                 raise unknown_name_error("field", name, rule, known)
 

@@ -307,6 +307,9 @@ def check_figure(plot: Any) -> None:
             "plot", plot, rule, remedy="Define, for example, def name(dataset, axes): ..."
         )
     name = name_of_figure(plot, "")
-    if not is_variable_name(name) or name in GENERIC_FIGURE_NAMES or name in study_names():
-        rule = "must have a valid name that differs from the names of the figures of rsfstudy"
-        raise InvalidValue("plot", name, rule)
+    if not is_variable_name(name):
+        rule = "must have a name that is a Python identifier"
+        raise InvalidValue("plot", name, rule, remedy="Define the figure with def.")
+    if name in GENERIC_FIGURE_NAMES or name in study_names():
+        rule = "must have a name that differs from the figures of rsfstudy"
+        raise InvalidValue("plot", name, rule, remedy="Rename the function or module.")

@@ -176,7 +176,7 @@ class Study:
                 raise InvalidValue(
                     name,
                     value,
-                    f"must consist of plain data, because they are stored as JSON ({error})",
+                    f"must consist of plain data, because the study is stored as JSON ({error})",
                 ) from error
 
     @staticmethod

@@ -52,7 +52,7 @@ def load_study(name_or_file: str) -> Study:
     if name_or_file not in study_names():
         near = difflib.get_close_matches(name_or_file, study_names(), n=3, cutoff=0.5)
         remedy = (
-            "Run `rsfstudy list` for all names, or pass the path of a study file "
+            "Run `rsfstudy list` to see all names, or pass the path of a study file "
             "(path/to/study.py)."
         )
         if os.path.isfile(f"{name_or_file}.py"):

@@ -140,7 +140,7 @@ def test_an_error_shows_rule_and_remedy(page):
     box = row.locator("input")
     box.fill("-3")
     box.press("Enter")
-    page.get_by_text("a must be greater than 0").wait_for()
+    page.get_by_text("'a' must be greater than 0").wait_for()
     assert "Traceback" not in page.content()
     assert page.evaluate(READ_COLUMN, "friction") == []
 

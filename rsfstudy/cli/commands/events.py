@@ -58,13 +58,14 @@ class RecordEvents(CommandResult):
 @make_quantity_option(
     "--stiffness",
     "Stiffness between the fault and the displacement sensor. If the record contains fault "
-    "slip, pass inf. Example: '0.05 MPa/um'.",
+    "slip, pass 'inf'. Example: '0.05 MPa/um'.",
 )
 @click.option(
     "--sign",
     type=click.Choice(["1", "-1"]),
-    help="Sign of the recorded shear stress if it acts in the direction of sliding.  [default: "
-    "-1 if all samples are negative, otherwise 1]",
+    help="Sign convention of the record: 1 if shear stress in the direction of sliding is "
+    "recorded as positive, -1 if it is recorded as negative.  [default: -1 if all "
+    "samples are negative, otherwise 1]",
 )
 @options.json_option
 def events(given: options.CommandOptions) -> int:

@@ -18,7 +18,7 @@ from rsfstudy.errors import SignalInterrupt
 @click.option(
     "--state",
     metavar="SETTINGS",
-    help="Initial settings of the page. Copy the settings from the tab Code of the page.",
+    help="Initial settings of the page. Copy the settings from the 'Code' tab of the page.",
 )
 @click.option(
     "--port",

@@ -109,8 +109,8 @@ def _make_comma_list_option(
 @reading_options
 @make_quantity_option(
     "--stiffness",
-    "Stiffness of the machine, optionally divided by the normal stress. To measure the "
-    "stiffness in the record, pass 'from record'. Examples: '0.03 MPa/um' or '1.6e-3 /um'.",
+    "Stiffness of the machine, optionally divided by the normal stress. To estimate "
+    "the stiffness from the record, pass 'from record'. Examples: '0.03 MPa/um' or '1.6e-3 /um'.",
 )
 @make_quantity_option(
     "--slip-distance", "Initial guess of the slip distance D_c. Example: '10 um'."
@@ -125,11 +125,11 @@ def _make_comma_list_option(
 @_make_comma_list_option(
     "--free",
     metavar="NAME,...",
-    help_text="Parameters to fit, separated by commas. Other possible parameters are stiffness, "
-    "step_time, trend2, alpha and, for law=family, law_exponent. If a law does not "
-    "have one of the parameters, the parameter is ignored for this law.  [default: a, "
-    "b, slip_distance, mu_star and trend1; for laws with two state variables: a, b1, "
-    "b2, slip_distance, slip_distance_2, mu_star and trend1]",
+    help_text="Parameters to fit, separated by commas. In addition to the default parameters, "
+    "you can fit stiffness, step_time, trend2, alpha and, for law=family, law_exponent. "
+    "Parameters that do not occur in a law are ignored for that law.  [default: a, b, "
+    "slip_distance, mu_star and trend1; for laws with two state variables: a, b1, b2, "
+    "slip_distance, slip_distance_2, mu_star and trend1]",
 )
 @_make_comma_list_option(
     "--step",
@@ -178,7 +178,7 @@ def _make_comma_list_option(
 @make_quantity_option(
     "--averaging",
     "Averaging time of the data logger. If each averaging window ends at the recorded time, "
-    "write trailing before the averaging time. Examples: '1 s' or 'trailing 1 s'.  [default: "
+    "write 'trailing' before the averaging time. Examples: '1 s' or 'trailing 1 s'.  [default: "
     "no averaging]",
 )
 @click.option(

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 )
 @options.study_file_option
 @options.make_output_option(
-    "Directory for the recomputed results.  [default: write no file]", file_okay=False
+    "Directory for the recomputed results.  [default: no file is written]", file_okay=False
 )
 @options.worker_options
 def rerun(given: options.CommandOptions) -> int:

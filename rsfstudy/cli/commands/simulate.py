@@ -29,7 +29,7 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 @click.command(cls=Command)
 @options.make_set_scene_fields_option(
     "Set a scene field. Values can have units if a rig is defined. The value of the field "
-    "loading can be the path of a CSV file. Examples: law=slowness, hold_time='100 s' or "
+    "'loading' can be the path of a CSV file. Examples: law=slowness, hold_time='100 s' or "
     "loading=record.csv."
 )
 @click.option(

@@ -270,8 +270,8 @@ class LawBase(Part):
                 f"the case for {unknown}"
             )
             remedy = (
-                "Omit stress_dependence. If the ratio of both stresses is constant, define "
-                "`coupling`."
+                "Omit stress_dependence. If you wrote the normal stress class, and the ratio of "
+                "both stresses is constant, define the property coupling in the class."
             )
             raise self.field_error("stress_dependence", rule, remedy)
         pressed = source.unknowns and not loading.has_load_point_unknown
@@ -282,8 +282,8 @@ class LawBase(Part):
         )
         if self.regularised and one_way:
             rule = (
-                f"cannot be combined with {one_way.name}, because the equations of "
-                f"{one_way.name} contain ln V and therefore require forward slip"
+                f"cannot be combined with {one_way.name!r}, because the equations of "
+                f"{one_way.name!r} contain ln V and therefore require forward slip"
             )
             raise self.field_error("regularised", rule, "Omit one of the two.")
 

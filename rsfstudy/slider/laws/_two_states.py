@@ -125,7 +125,10 @@ class TwoStateLaw(LawBase):
         replace ``b_over_a``.
         """
         if name == "b_over_a":
-            rule = f"follows from b1_over_a and b2_over_a for {cls.name}, because it is their sum"
+            rule = (
+                f"cannot be set for law={cls.name!r}, because b_over_a is the sum of b1_over_a and "
+                "b2_over_a"
+            )
             return InvalidValue(name, value, rule, remedy="Pass b1_over_a and b2_over_a.")
         return super().rejection_error(name, value)
 
