@@ -90,7 +90,9 @@ def test_its_file_is_shown_drawn_and_exported(written):
     file = str(here / "fit.nc")
     shown = call_main("show", file)
     assert shown.returncode == 0
-    fixed = re.search(r"^fixed fields .*?^fields equal", shown.stdout, re.MULTILINE | re.DOTALL).group()
+    fixed = re.search(
+        r"^fixed fields .*?^fields equal", shown.stdout, re.MULTILINE | re.DOTALL
+    ).group()
     assert "normal_stress = constant" in fixed
     # The fit has determined the other fields, or replaced them by the values of the record.
     for name in ("a", "b_over_a", "mu_star", "stiffness", "reference_rate"):

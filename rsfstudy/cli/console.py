@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 from rich.console import Console, ConsoleDimensions
@@ -35,7 +34,7 @@ class PlainConsole(Console):
         redirected and ``COLUMNS`` is not set, the width is 100 characters.
         """
         found = super().size
-        if not self.is_terminal and not os.environ.get("COLUMNS", "").isdigit():
+        if not self.is_terminal and not self._environ.get("COLUMNS", "").isdigit():
             return ConsoleDimensions(_WIDTH_OF_REDIRECTED_OUTPUT, found.height)
         return ConsoleDimensions(min(max(found.width, _MIN_WIDTH), _MAX_WIDTH), found.height)
 
