@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 #: Exported names by module. A module is imported when one of its names is first used, so that
 #: worker processes do not import modules that only the main process needs.
-_LAZY_EXPORTS = {
+_EXPORTED_NAMES_BY_MODULE = {
     "slider.scene": ("Scene",),
     "slider.loading": ("Segment",),
     "slider.user_loadings": ("protocol",),
@@ -86,18 +86,18 @@ _LAZY_EXPORTS = {
     "explorer.entry_points": ("explore",),
 }
 _MODULE_BY_EXPORTED_NAME = {
-    name: module for module, names in _LAZY_EXPORTS.items() for name in names
+    name: module for module, names in _EXPORTED_NAMES_BY_MODULE.items() for name in names
 }
 
 #: Documented submodules that ``rsfstudy`` provides in addition to the exported names.
-_DOCUMENTED_NAMESPACES = ("fitting", "measures", "parts", "plots", "reductions", "reduce")
+_PUBLIC_SUBMODULE_NAMES = ("fitting", "measures", "parts", "plots", "reductions", "reduce")
 
 __all__ = sorted(_MODULE_BY_EXPORTED_NAME)
 
 
 def __getattr__(name: str) -> Any:
     """Import an exported name or a documented namespace on first use."""
-    if name in _DOCUMENTED_NAMESPACES:
+    if name in _PUBLIC_SUBMODULE_NAMES:
         return importlib.import_module(f"{__name__}.{name}")
     if name in NEW_NAME_BY_OWNER_AND_FORMER_NAME[__name__]:
         warn_renamed(name, new := NEW_NAME_BY_OWNER_AND_FORMER_NAME[__name__][name], __name__)

@@ -632,10 +632,12 @@ def add_former_member_names(
     type
         The modified class.
     """
-    for former, new in NEW_NAME_BY_OWNER_AND_FORMER_NAME[
-        _key_of_class_or_function(owner_class)
-    ].items():
-        setattr(owner_class, former, (_FormerField if writable else _FormerMember)(former, new))
+    for former, new in NEW_NAME_BY_OWNER_AND_FORMER_NAME[_build_owner_key(owner_class)].items():
+        setattr(
+            owner_class,
+            former,
+            (_WritableFormerNameDescriptor if writable else _FormerNameDescriptor)(former, new),
+        )
     return owner_class
 
 
@@ -654,7 +656,7 @@ def translate_former_member_name(owner_class: type, member_name: str) -> str:
     str
         New name. A name that is not a former name is returned unchanged.
     """
-    new = NEW_NAME_BY_OWNER_AND_FORMER_NAME[_key_of_class_or_function(owner_class)].get(
+    new = NEW_NAME_BY_OWNER_AND_FORMER_NAME[_build_owner_key(owner_class)].get(
         member_name, member_name
     )
     if new != member_name:
@@ -676,7 +678,7 @@ def add_new_names_for_former_members(subclass: type) -> None:
     """
     for base in subclass.__mro__[1:]:
         for former, new in NEW_NAME_BY_OWNER_AND_FORMER_NAME.get(
-            _key_of_class_or_function(base), {}
+            _build_owner_key(base), {}
         ).items():
             own, annotation = (
                 vars(subclass),
@@ -706,7 +708,7 @@ def accept_former_keyword_names(function_or_class: DecoratedFunction) -> Decorat
     callable or type
         Wrapped function, or the class with a wrapped constructor.
     """
-    table = NEW_NAME_BY_OWNER_AND_FORMER_NAME[f"{_key_of_class_or_function(function_or_class)}()"]
+    table = NEW_NAME_BY_OWNER_AND_FORMER_NAME[f"{_build_owner_key(function_or_class)}()"]
     owner: Any = function_or_class
     wrapped = owner.__init__ if isinstance(function_or_class, type) else function_or_class
 
@@ -724,7 +726,7 @@ def accept_former_keyword_names(function_or_class: DecoratedFunction) -> Decorat
     return function_or_class
 
 
-class _FormerMember:
+class _FormerNameDescriptor:
     """Descriptor that looks up a member by its new name."""
 
     def __init__(self, former_name: str, new_name: str) -> None:
@@ -743,7 +745,7 @@ class _FormerMember:
         return getattr(super(defining[-1], target) if defining else target, self.new)
 
 
-class _FormerField(_FormerMember):
+class _WritableFormerNameDescriptor(_FormerNameDescriptor):
     """Descriptor of a field that can also be assigned under its former name."""
 
     def __set__(self, instance: Any, value: Any) -> None:
@@ -757,6 +759,6 @@ def _build_property_reading_field(field_name: str) -> property:
     return property(lambda self: getattr(self, field_name))
 
 
-def _key_of_class_or_function(class_or_function: Any) -> str:
+def _build_owner_key(class_or_function: Any) -> str:
     """Return the key of a class or function in ``NEW_NAME_BY_OWNER_AND_FORMER_NAME``."""
     return f"{class_or_function.__module__}:{class_or_function.__qualname__}"

@@ -34,7 +34,7 @@ _MISSING_DIMENSION_MESSAGE_PATTERN = re.compile(
     r"'(.+?)' (?:not found in array dimensions|is not a valid dimension)"
 )
 #: Descriptions of simple types for error messages.
-_TYPE_DESCRIPTIONS: Mapping[Any, str] = {
+_DESCRIPTION_BY_TYPE: Mapping[Any, str] = {
     str: "a string",
     bool: "True or False",
     int: "a whole number",
@@ -69,7 +69,7 @@ def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
                 raise InvalidValue(name, part, rule, remedy="Pass a shorter list.")
 
 
-def string_instead_of_list_error(
+def find_string_instead_of_list_error(
     function: Callable[..., Any], arguments: Mapping[str, Any], error: Exception
 ) -> InvalidValue | None:
     """Return an error if a string was passed in place of a list of strings.
@@ -92,7 +92,7 @@ def string_instead_of_list_error(
     InvalidValue or None
         Error that names the argument. The value is None if no string was passed in place of a list.
     """
-    for name, value, annotation in _annotated_arguments(function, arguments):
+    for name, value, annotation in _iterate_annotated_arguments(function, arguments):
         blamed = getattr(error, "value", None)
         if not isinstance(value, str) or (isinstance(blamed, str) and blamed == value):
             continue
@@ -105,7 +105,7 @@ def string_instead_of_list_error(
     return None
 
 
-def type_mismatch_error(
+def find_type_mismatch_error(
     function: Callable[..., Any], arguments: Mapping[str, Any], remedy: str
 ) -> InvalidValue | None:
     """Return an error for the first argument that has the wrong type.
@@ -124,14 +124,14 @@ def type_mismatch_error(
     InvalidValue or None
         Error that names the argument. The value is None if all arguments match their annotations.
     """
-    for name, value, annotation in _annotated_arguments(function, arguments):
+    for name, value, annotation in _iterate_annotated_arguments(function, arguments):
         if not matches_annotation(value, annotation):
             rule = f"must be {describe_type(annotation)}"
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
 
 
-def unusable_value_error(
+def find_unusable_value_error(
     arguments: Mapping[str, Any], error: Exception, remedy: str
 ) -> InvalidValue | None:
     """Return an error for the first argument that may have caused an exception.
@@ -162,7 +162,7 @@ def unusable_value_error(
                 return InvalidValue(name, value, "is too large", remedy=remedy)
             if isinstance(part, str) and not _is_encodable_as_utf8(part):
                 return InvalidValue(name, value, "must be a string that can be encoded as UTF-8")
-        if (dimension := _find_missing_dimension(value, error)) is not None:
+        if (dimension := _find_missing_dimension_in_error(value, error)) is not None:
             rule, dims = f"has no dimension {shorten_text(dimension)!r}", map(str, value.dims)
             return InvalidValue(name, value, rule, choices=dims, remedy=remedy)
         if isinstance(error, OSError) and _is_substring_of_path(value, error.filename):
@@ -182,7 +182,7 @@ def unusable_value_error(
     return None
 
 
-def _find_missing_dimension(value: Any, error: Exception) -> str | None:
+def _find_missing_dimension_in_error(value: Any, error: Exception) -> str | None:
     """Return the array dimension that xarray reports as missing."""
     found = (
         _MISSING_DIMENSION_MESSAGE_PATTERN.search(str(error))
@@ -221,7 +221,7 @@ def _was_raised_by(function: Callable[..., Any], error: Exception) -> bool:
     return isinstance(error, TypeError)
 
 
-def convert_numpy_number(value: Any) -> Any:
+def convert_numpy_number_to_python(value: Any) -> Any:
     """Convert a NumPy number or Boolean to a Python object.
 
     Parameters
@@ -302,8 +302,8 @@ def describe_type(annotation: Any) -> str:
     if origin is type:
         return "a class"
     kind = origin or annotation
-    if kind in _TYPE_DESCRIPTIONS:
-        return _TYPE_DESCRIPTIONS[kind]
+    if kind in _DESCRIPTION_BY_TYPE:
+        return _DESCRIPTION_BY_TYPE[kind]
     if kind is Callable or not isinstance(kind, type):
         return "a function"
     is_plain = kind.__module__ in ("builtins", "collections", "collections.abc")
@@ -387,7 +387,7 @@ def _allows_list_of_strings(annotation: Any) -> bool:
     )
 
 
-def _annotated_arguments(
+def _iterate_annotated_arguments(
     function: Callable[..., Any], arguments: Mapping[str, Any]
 ) -> Iterator[tuple[str, Any, Any]]:
     """Yield the name, value and annotation of each argument.

@@ -19,21 +19,21 @@ from typing import Any, ParamSpec, Self, TypeVar
 from rsfstudy._deprecation import find_stacklevel_of_user_code as find_stacklevel_of_user_code
 from rsfstudy.argument_checks import (
     check_argument_lengths,
-    convert_numpy_number,
-    string_instead_of_list_error,
-    type_mismatch_error,
-    unusable_value_error,
+    convert_numpy_number_to_python,
+    find_string_instead_of_list_error,
+    find_type_mismatch_error,
+    find_unusable_value_error,
 )
 from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, shorten_text
 
 FunctionParameters = ParamSpec("FunctionParameters")
 FunctionResult = TypeVar("FunctionResult")
-GuardedClass = TypeVar("GuardedClass", bound=type)
+WrappedClass = TypeVar("GuardedClass", bound=type)
 
 #: Exceptions that the error boundary does not convert.
 _EXCEPTIONS_PASSED_UNCHANGED = (RsfStudyError, Warning, bdb.BdbQuit)
 #: Special methods that are wrapped in addition to the methods without a leading underscore.
-_GUARDED_SPECIAL_METHODS = ("__init__", "__new__", "__call__", "__getitem__")
+_WRAPPED_SPECIAL_METHODS = ("__init__", "__new__", "__call__", "__getitem__")
 #: Modules that are skipped when the error boundary looks for the calling module, because they only
 #: forward calls from other modules.
 _MODULES_SKIPPED_WHEN_FINDING_CALLER = ("dataclasses", "functools", "rsfstudy._deprecation")
@@ -76,7 +76,7 @@ def error_boundary(
     )
 
 
-def wrap_methods_in_error_boundary(guarded_class: GuardedClass) -> GuardedClass:
+def wrap_methods_in_error_boundary(wrapped_class: WrappedClass) -> WrappedClass:
     """Apply the error boundary to the constructor and the public methods.
 
     The wrapped constructor also rejects arguments that do not match their annotations. Most
@@ -94,19 +94,19 @@ def wrap_methods_in_error_boundary(guarded_class: GuardedClass) -> GuardedClass:
     type
         The modified class.
     """
-    for name, member in list(vars(guarded_class).items()):
-        if name.startswith("_") and name not in _GUARDED_SPECIAL_METHODS:
+    for name, member in list(vars(wrapped_class).items()):
+        if name.startswith("_") and name not in _WRAPPED_SPECIAL_METHODS:
             continue
         is_constructor = name in ("__init__", "__new__")
         is_static = isinstance(member, staticmethod)
         if isinstance(member, classmethod) or (is_static and is_constructor):
             guarded = _wrap_in_error_boundary(member.__func__, is_constructor=is_constructor)
-            setattr(guarded_class, name, type(member)(guarded))
+            setattr(wrapped_class, name, type(member)(guarded))
         elif inspect.isfunction(member):
             setattr(
-                guarded_class, name, _wrap_in_error_boundary(member, is_constructor=is_constructor)
+                wrapped_class, name, _wrap_in_error_boundary(member, is_constructor=is_constructor)
             )
-    return guarded_class
+    return wrapped_class
 
 
 class ConstructorKeywordCheckMixin:
@@ -132,15 +132,15 @@ class ConstructorKeywordCheckMixin:
     def __new__(cls, *args: Any, **keywords: Any) -> Self:
         """Create an instance after checking the keyword arguments."""
         kind: type = cls
-        valid = _constructor_parameters(kind)
+        valid = _list_constructor_parameters(kind)
         for name in keywords if valid else ():
             if name not in valid:
-                raise _unknown_keyword_error(cls.__name__, name, valid)
+                raise _build_unknown_keyword_error(cls.__name__, name, valid)
         return super().__new__(cls)
 
 
 @functools.cache
-def _constructor_parameters(cls: type) -> tuple[str, ...]:
+def _list_constructor_parameters(cls: type) -> tuple[str, ...]:
     """Return the parameter names of the constructor of a class.
 
     The tuple is empty if the constructor accepts arbitrary keywords.
@@ -177,7 +177,7 @@ def _wrap_in_error_boundary(
             names = [n for n in signature.parameters if n not in ("self", "cls", "_cls")]
             unknown = [keyword for keyword in options if keyword not in names]
             if unknown:
-                raise _unknown_keyword_error(name, unknown[0], names) from None
+                raise _build_unknown_keyword_error(name, unknown[0], names) from None
             text = f"{name}() {shorten_text(error)}. Parameters: {', '.join(names) or 'none'}."
             raise CallError(text) from None
 
@@ -188,8 +188,8 @@ def _wrap_in_error_boundary(
         if convert_arguments:
             args, options = convert_arguments(args, options)
         if is_constructor:
-            args = tuple(map(convert_numpy_number, args))  # type: ignore[assignment]
-            options = {key: convert_numpy_number(value) for key, value in options.items()}  # type: ignore[assignment]
+            args = tuple(map(convert_numpy_number_to_python, args))  # type: ignore[assignment]
+            options = {key: convert_numpy_number_to_python(value) for key, value in options.items()}  # type: ignore[assignment]
         if not is_called_internally and _is_called_from_rsfstudy():
             try:
                 return function(*args, **options)
@@ -201,27 +201,27 @@ def _wrap_in_error_boundary(
         try:
             answered = function(*args, **options)
         except InvalidValue as error:
-            if wrong := string_instead_of_list_error(function, arguments, error):
+            if wrong := find_string_instead_of_list_error(function, arguments, error):
                 raise wrong from error
             raise
         except unchanged_exceptions:
             raise
         except Exception as error:
-            wrong = type_mismatch_error(function, arguments, remedy)
-            wrong = wrong or unusable_value_error(arguments, error, remedy)
-            raise wrong or _failed_call_error(name, arguments, error) from error
+            wrong = find_type_mismatch_error(function, arguments, remedy)
+            wrong = wrong or find_unusable_value_error(arguments, error, remedy)
+            raise wrong or _build_failed_call_error(name, arguments, error) from error
         if is_constructor:
             # The constructor may have converted the arguments to other types.
             made = getattr(arguments.get("self"), "__dict__", {})
             stored = {name: made.get(name, value) for name, value in arguments.items()}
-            if wrong := type_mismatch_error(function, stored, remedy):
+            if wrong := find_type_mismatch_error(function, stored, remedy):
                 raise wrong
         return answered
 
     return wrapper
 
 
-def _unknown_keyword_error(
+def _build_unknown_keyword_error(
     callable_name: str, keyword: str, valid_keywords: Iterable[str]
 ) -> CallError:
     """Return the error for an unknown keyword of a function or class."""
@@ -251,7 +251,7 @@ def _is_internal_module(module_name: str | None) -> bool:
     return name.startswith("rsfstudy.") and not name.startswith("rsfstudy.cli.")
 
 
-def _failed_call_error(
+def _build_failed_call_error(
     callable_name: str, arguments: dict[str, Any], error: Exception
 ) -> RsfStudyError:
     """Return the error for a failed call if all arguments have valid types."""

@@ -137,7 +137,7 @@ class InvalidValue(RsfStudyError, ValueError):
         self.name = name
         self.value = value
 
-    def with_location(self, place: str) -> InvalidValue:
+    def with_location(self, location: str) -> InvalidValue:
         """Return a copy of the error with a location at the beginning of the message.
 
         Parameters
@@ -151,7 +151,7 @@ class InvalidValue(RsfStudyError, ValueError):
             Copy of the error with the same name and value.
         """
         placed = InvalidValue.__new__(InvalidValue)
-        Exception.__init__(placed, f"{shorten_text(place)}: {self}")
+        Exception.__init__(placed, f"{shorten_text(location)}: {self}")
         placed.name, placed.value = self.name, self.value
         return placed
 

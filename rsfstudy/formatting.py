@@ -94,7 +94,7 @@ def format_list(values: Sequence[Any], separator: str = ",") -> str:
     )
 
 
-def pluralize(count: int, noun: str) -> str:
+def format_count_with_noun(count: int, noun: str) -> str:
     """Format a count with a noun, such as "1 cell" or "2 cells".
 
     Parameters

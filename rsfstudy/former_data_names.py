@@ -30,7 +30,7 @@ _FORMER_DESCRIPTIONS_OF_INTERVAL_ENDS = tuple(
     f"{end} end of the 95 % interval of the" for end in ("lower", "upper", "low", "high")
 )
 #: New names of the fields of claims and of reductions, and of the outputs of measures.
-_NEW_CLAIM_FIELDS = {
+_NEW_CLAIM_FIELD_BY_FORMER_FIELD = {
     "minus": "baseline",
     "minus_variable": "baseline_variable",
     "because": "difference_reason",
@@ -39,22 +39,22 @@ _NEW_FIELDS_BY_REDUCTION_KIND = {
     "proportional_fit": {"minus": "intercept"},
     "spread": {"on": "over"},
 }
-_NEW_REDUCTION_KINDS = {"spread": "range"}
-_NEW_OUTPUTS_BY_MEASURE = {
+_NEW_REDUCTION_KIND_BY_FORMER_KIND = {"spread": "range"}
+_NEW_OUTPUT_NAMES_BY_MEASURE = {
     "synthetic_fit": {"criterion": "aic"},
     "fit": {
         former: new for (former, _text), new in _NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION.items()
     },
 }
 #: New names of the columns of the table of verdicts, by former name.
-NEW_VERDICT_COLUMNS: Mapping[str, str] = {
+NEW_VERDICT_COLUMN_BY_FORMER_COLUMN: Mapping[str, str] = {
     "ours": "computed",
     "moved": "verdict_changed",
     "because": "difference_reason",
 }
 
 
-def rename_former_fields(declaration: Any) -> Any:
+def rename_former_declaration_fields(declaration: Any) -> Any:
     """Replace the former names in the stored declaration of a study.
 
     Parameters
@@ -72,8 +72,8 @@ def rename_former_fields(declaration: Any) -> Any:
     current = dict(declaration)
     measure = current.get("measure")
     name = measure.get("name") if isinstance(measure, Mapping) else None
-    outputs = dict(_NEW_OUTPUTS_BY_MEASURE.get(name, {})) if isinstance(name, str) else {}
-    outputs |= _new_names_of_sobol_intervals(current.get("reductions"))
+    outputs = dict(_NEW_OUTPUT_NAMES_BY_MEASURE.get(name, {})) if isinstance(name, str) else {}
+    outputs |= _find_new_names_of_sobol_intervals(current.get("reductions"))
     for key, rename in (("claims", _rename_claim_fields), ("reductions", _rename_reduction_fields)):
         if isinstance(listed := current.get(key), list):
             current[key] = [
@@ -82,7 +82,7 @@ def rename_former_fields(declaration: Any) -> Any:
     return current
 
 
-def _new_names_of_sobol_intervals(reductions: Any) -> dict[str, str]:
+def _find_new_names_of_sobol_intervals(reductions: Any) -> dict[str, str]:
     """Return the new names of the confidence intervals of Sobol indices."""
     names = [
         reduction.get("name")
@@ -97,14 +97,18 @@ def _new_names_of_sobol_intervals(reductions: Any) -> dict[str, str]:
     }
 
 
-def _rename_claim_fields(claim: Mapping[str, Any], outputs: Mapping[str, str]) -> dict[str, Any]:
+def _rename_claim_fields(
+    claim: Mapping[str, Any], new_output_names: Mapping[str, str]
+) -> dict[str, Any]:
     """Replace the former names of the fields of a claim."""
-    current = {_NEW_CLAIM_FIELDS.get(key, key): value for key, value in claim.items()}
-    return _rename_outputs(current, ("variable", "baseline_variable"), outputs)
+    current = {
+        _NEW_CLAIM_FIELD_BY_FORMER_FIELD.get(key, key): value for key, value in claim.items()
+    }
+    return _rename_outputs_in_fields(current, ("variable", "baseline_variable"), new_output_names)
 
 
 def _rename_reduction_fields(
-    reduction: Mapping[str, Any], outputs: Mapping[str, str]
+    reduction: Mapping[str, Any], new_output_names: Mapping[str, str]
 ) -> dict[str, Any]:
     """Replace the former names of the kind and the fields of a reduction."""
     kind = reduction.get("kind")
@@ -112,17 +116,17 @@ def _rename_reduction_fields(
         return dict(reduction)
     new = _NEW_FIELDS_BY_REDUCTION_KIND.get(kind, {})
     current = {new.get(key, key): value for key, value in reduction.items()}
-    current["kind"] = _NEW_REDUCTION_KINDS.get(kind, kind)
-    return _rename_outputs(current, ("of",), outputs)
+    current["kind"] = _NEW_REDUCTION_KIND_BY_FORMER_KIND.get(kind, kind)
+    return _rename_outputs_in_fields(current, ("of",), new_output_names)
 
 
-def _rename_outputs(
-    fields: dict[str, Any], keys: tuple[str, ...], outputs: Mapping[str, str]
+def _rename_outputs_in_fields(
+    fields: dict[str, Any], field_names: tuple[str, ...], new_output_names: Mapping[str, str]
 ) -> dict[str, Any]:
     """Replace former output names that occur as values of the given fields."""
-    for key in keys:
+    for key in field_names:
         if isinstance(name := fields.get(key), str):
-            fields[key] = outputs.get(name, name)
+            fields[key] = new_output_names.get(name, name)
     return fields
 
 
@@ -143,7 +147,12 @@ def rename_former_variables(dataset: xr.Dataset) -> xr.Dataset:
     new = {
         name: current
         for name, values in dataset.data_vars.items()
-        if (current := _current_name(str(name), str(values.attrs.get("long_name", "")))) != name
+        if (
+            current := _find_current_variable_name(
+                str(name), str(values.attrs.get("long_name", ""))
+            )
+        )
+        != name
     }
     if not new:
         return dataset
@@ -154,7 +163,7 @@ def rename_former_variables(dataset: xr.Dataset) -> xr.Dataset:
     return renamed
 
 
-def _current_name(variable_name: str, description: str) -> str:
+def _find_current_variable_name(variable_name: str, description: str) -> str:
     """Return the current name of a variable."""
     for (former, beginning), new in _NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION.items():
         if variable_name == former and description.startswith(beginning):
@@ -177,18 +186,18 @@ class TableWithFormerColumns(pd.DataFrame):
     """
 
     #: New column names by former name. A key that begins with an underscore is a suffix.
-    NEW_COLUMNS: ClassVar[Mapping[str, str]] = {}
+    NEW_COLUMN_BY_FORMER_COLUMN: ClassVar[Mapping[str, str]] = {}
 
     @property
     def _constructor(self) -> type[pd.DataFrame]:
         """Class of the data frames that selections from the table return."""
         return pd.DataFrame
 
-    def _find_column(self, key: Any) -> Any:
+    def _find_current_column_name(self, key: Any) -> Any:
         """Return the current name of a column, and warn if the key is a former name."""
         if not isinstance(key, str) or key in self.columns:
             return key
-        for former, new in self.NEW_COLUMNS.items():
+        for former, new in self.NEW_COLUMN_BY_FORMER_COLUMN.items():
             is_match = key.endswith(former) if former.startswith("_") else key == former
             current = key.removesuffix(former) + new
             if is_match and current in self.columns:
@@ -199,13 +208,13 @@ class TableWithFormerColumns(pd.DataFrame):
     def __getitem__(self, key: Any) -> Any:
         """Select a column, several columns, or rows."""
         if isinstance(key, list):
-            names = [self._find_column(one) for one in key]
+            names = [self._find_current_column_name(one) for one in key]
             selected = super().__getitem__(names)
             return selected if names == key else selected.set_axis(key, axis="columns")
-        return super().__getitem__(self._find_column(key))
+        return super().__getitem__(self._find_current_column_name(key))
 
     def __getattr__(self, name: str) -> Any:  # type: ignore[misc]
         """Return a column as an attribute."""
-        if not name.startswith("_") and (current := self._find_column(name)) != name:
+        if not name.startswith("_") and (current := self._find_current_column_name(name)) != name:
             return self[current]
         return super().__getattr__(name)

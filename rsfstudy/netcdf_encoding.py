@@ -8,7 +8,7 @@ from typing import Any
 import xarray as xr
 
 
-def encoding_without_fill_values(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
+def build_encoding_without_fill_values(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
     """Return an encoding that omits unwanted fill values.
 
     Coordinates, flags and counts are written without the attribute ``_FillValue``.
@@ -54,6 +54,6 @@ def copy_with_cf_encoding(dataset: xr.Dataset) -> xr.Dataset:
         Copy with the updated encoding.
     """
     encoded = dataset.copy()
-    for name, encoding in encoding_without_fill_values(encoded).items():
+    for name, encoding in build_encoding_without_fill_values(encoded).items():
         encoded[name].encoding.update(encoding)
     return encoded

@@ -27,7 +27,7 @@ _TYPES_DIGESTED_BY_REPR = (int, float, complex, str, bytes, bool, type(None), ty
 _INSTRUCTIONS_READING_GLOBALS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")
 #: Types of objects, each with a function. The function returns the contents of a container, or the
 #: function inside a wrapper.
-_GETTERS_OF_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
+_TYPES_AND_CONTENTS_GETTERS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
     (property, lambda value: (value.fget, value.fset)),
     (functools.cached_property, lambda value: value.func),
     (functools.partial, lambda value: (value.func, value.args, value.keywords)),
@@ -75,7 +75,7 @@ class ObjectDigest:
         """
         return self._sha256.hexdigest()[:length]
 
-    def add(self, value: Any, used_names: Iterable[str] = ()) -> Self:
+    def add_object(self, value: Any, used_names: Iterable[str] = ()) -> Self:
         """Update the digest with an object and all objects that this object uses.
 
         Parameters
@@ -100,7 +100,7 @@ class ObjectDigest:
         elif isinstance(value, tuple):  # Equal tuples may or may not be the same object.
             self._add_texts(f"{len(value)} together")
             for part in value:
-                self.add(part, used_names)
+                self.add_object(part, used_names)
         elif self._is_first_visit(id(value), value):
             self._add_unvisited_object(value, used_names)
         return self
@@ -127,11 +127,11 @@ class ObjectDigest:
         elif type(value) is np.ndarray and value.dtype.kind != "O":
             self._add_texts(f"{value.dtype} {value.shape} {value.tobytes().hex()}")
         elif getter := next(
-            (get for kind, get in _GETTERS_OF_CONTAINER_PARTS if isinstance(value, kind)), None
+            (get for kind, get in _TYPES_AND_CONTENTS_GETTERS if isinstance(value, kind)), None
         ):
-            self.add(getter(value), used_names)
+            self.add_object(getter(value), used_names)
         elif hasattr(value, "__wrapped__"):  # The value is a cached function.
-            self.add(value.__wrapped__, used_names)
+            self.add_object(value.__wrapped__, used_names)
         else:
             self._add_class(type(value))
             self._add_state_of_instance(value, used_names)
@@ -142,7 +142,7 @@ class ObjectDigest:
             self._add_texts(module.__name__)
         elif self._is_first_visit((id(module), *used_names), module):
             used = [name for name in used_names if name in vars(module)]
-            self.add(tuple(self._replace(vars(module)[name]) for name in used), used_names)
+            self.add_object(tuple(self._replace(vars(module)[name]) for name in used), used_names)
 
     def _add_function(self, function: FunctionType) -> None:
         self._add_texts(function.__qualname__)
@@ -154,30 +154,30 @@ class ObjectDigest:
             for cell in function.__closure__ or ()
             if cell != CellType()
         ]
-        names = tuple(_names_used_by_code(function.__code__))
-        self.add((function.__defaults__, function.__kwdefaults__, *cells), names)
-        for name in global_names_read_by(function.__code__):
+        names = tuple(_iterate_names_used_by_code(function.__code__))
+        self.add_object((function.__defaults__, function.__kwdefaults__, *cells), names)
+        for name in list_global_names_read_by_code(function.__code__):
             if name in function.__globals__:
                 self._add_texts(name)
-                self.add(self._replace(function.__globals__[name]), names)
+                self.add_object(self._replace(function.__globals__[name]), names)
 
     def _add_code(self, code: CodeType) -> None:
         self._add_texts(code.co_name, code.co_code.hex(), *code.co_names, *code.co_varnames)
-        self.add(code.co_consts[_has_docstring_slot(code) :])
+        self.add_object(code.co_consts[_has_docstring_slot(code) :])
 
     def _add_class(self, added_class: type) -> None:
         self._add_texts(added_class.__qualname__)
         if not self._reads_module(added_class.__module__):
             return
-        self.add(added_class.__bases__)
+        self.add_object(added_class.__bases__)
         for name, value in sorted(vars(added_class).items()):
             if not _is_generated_class_member(name, value):
                 self._add_texts(name)
-                self.add(value)
+                self.add_object(value)
 
     def _add_state_of_instance(self, value: Any, used_names: Iterable[str]) -> None:
         if self._reads_module(type(value).__module__):
-            self.add(_state_without_caches(value), used_names)
+            self.add_object(_collect_uncached_attributes(value), used_names)
             return
         content = io.BytesIO()
         try:
@@ -197,7 +197,7 @@ class _PicklerWithoutCachedProperties(pickle.Pickler):
 
     def reducer_override(self, value: Any) -> Any:
         """Pickle a copy of the object without its cached properties."""
-        state = _state_without_caches(value)
+        state = _collect_uncached_attributes(value)
         if isinstance(value, type) or len(state) == len(getattr(value, "__dict__", ())):
             return NotImplemented
         bare = copy.copy(value)
@@ -206,7 +206,7 @@ class _PicklerWithoutCachedProperties(pickle.Pickler):
         return bare.__reduce_ex__(4)
 
 
-def _state_without_caches(value: Any) -> dict[str, Any]:
+def _collect_uncached_attributes(value: Any) -> dict[str, Any]:
     """Return the attributes of an object without its cached properties."""
     return {
         name: part
@@ -236,7 +236,7 @@ def _is_generated_class_member(member_name: str, value: Any) -> bool:
     return made or (member_name.startswith("__") and not callable(value))
 
 
-def _names_used_by_code(code: CodeType) -> Iterator[str]:
+def _iterate_names_used_by_code(code: CodeType) -> Iterator[str]:
     """Yield the global names and attribute names that a function uses.
 
     The names include the names that nested functions use.
@@ -244,11 +244,11 @@ def _names_used_by_code(code: CodeType) -> Iterator[str]:
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            yield from _names_used_by_code(constant)
+            yield from _iterate_names_used_by_code(constant)
 
 
 @functools.cache
-def global_names_read_by(code: CodeType) -> tuple[str, ...]:
+def list_global_names_read_by_code(code: CodeType) -> tuple[str, ...]:
     """Return the names of the globals that a function and its nested functions read.
 
     Parameters
@@ -264,5 +264,5 @@ def global_names_read_by(code: CodeType) -> tuple[str, ...]:
     reads = [
         i.argval for i in dis.get_instructions(code) if i.opname in _INSTRUCTIONS_READING_GLOBALS
     ]
-    nested = (global_names_read_by(c) for c in code.co_consts if isinstance(c, CodeType))
+    nested = (list_global_names_read_by_code(c) for c in code.co_consts if isinstance(c, CodeType))
     return tuple(dict.fromkeys((*reads, *(name for names in nested for name in names))))

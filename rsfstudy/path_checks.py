@@ -10,7 +10,7 @@ from rsfstudy.errors import InvalidValue
 MAX_NAME_BYTES, MAX_PATH_BYTES = 255, 4096
 
 
-def check_path(argument_name: str, path: str | Path) -> Path:
+def check_path_is_valid(argument_name: str, path: str | Path) -> Path:
     """Check that a path is valid, even if no file or directory exists there.
 
     Parameters

@@ -145,7 +145,7 @@ class Output(Quantity):
         return (self.name, f"{self.name}_error") if self.error else (self.name,)
 
 
-def is_variable_name(name: object) -> bool:
+def is_valid_variable_name(name: object) -> bool:
     """Return True if an object is a valid variable name.
 
     Parameters
@@ -196,7 +196,7 @@ def split_unit_quotient(unit_quotient: str) -> list[str]:
     return [each.removesuffix(")-1") for each in unit_quotient.split(" (")]
 
 
-def units_or_scale_of_variable(attributes: Mapping[Any, Any]) -> str:
+def read_units_or_scale(attributes: Mapping[Any, Any]) -> str:
     """Return the units of a variable, or the scale of a normalised variable.
 
     Parameters
@@ -263,7 +263,7 @@ class HtmlMarkup(str):
         return escape(escape_control_characters(str(text)))
 
     @classmethod
-    def table(
+    def format_table(
         cls, headings: Sequence[str], rows: Iterable[Sequence[object]], caption: str = ""
     ) -> HtmlMarkup:
         """Format a table in HTML.
@@ -300,8 +300,11 @@ class HtmlMarkup(str):
         return cls(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
 
 
-def html_quantities_table(
-    rows: Iterable[tuple[Quantity, object]], caption: str = "", *, with_values: bool = True
+def format_quantities_as_html_table(
+    quantities_with_values: Iterable[tuple[Quantity, object]],
+    caption: str = "",
+    *,
+    with_values: bool = True,
 ) -> HtmlMarkup:
     """Format a table of quantities in HTML.
 
@@ -320,21 +323,21 @@ def html_quantities_table(
         Table with the columns field, symbol, value, unit and meaning.
     """
     shown = [n for n, text in enumerate(_QUANTITY_TABLE_HEADINGS) if with_values or text != "value"]
-    table = (_quantity_row(about, value) for about, value in rows)
-    return HtmlMarkup.table(
+    table = (_build_quantity_row(about, value) for about, value in quantities_with_values)
+    return HtmlMarkup.format_table(
         [_QUANTITY_TABLE_HEADINGS[n] for n in shown],
         ([row[n] for n in shown] for row in table),
         caption,
     )
 
 
-def _quantity_row(quantity: Quantity, value: object) -> tuple[object, ...]:
+def _build_quantity_row(quantity: Quantity, value: object) -> tuple[object, ...]:
     """Return the table row of a quantity, in the order of the headings."""
     return (
         quantity.name,
-        html_symbol(quantity.symbol),
+        format_symbol_as_html(quantity.symbol),
         value,
-        html_unit(quantity),
+        format_unit_as_html(quantity),
         quantity.long_name,
     )
 
@@ -361,10 +364,10 @@ class HtmlTableMixin:
 
     def _repr_html_(self) -> str:
         """Return the HTML table that notebooks display."""
-        return html_quantities_table(self.quantities_with_values(), type(self).__name__)
+        return format_quantities_as_html_table(self.quantities_with_values(), type(self).__name__)
 
 
-def html_symbol(formula: str) -> HtmlMarkup:
+def format_symbol_as_html(latex_symbol: str) -> HtmlMarkup:
     """Convert a symbol from LaTeX to HTML that needs no MathJax.
 
     Parameters
@@ -378,16 +381,16 @@ def html_symbol(formula: str) -> HtmlMarkup:
     HtmlMarkup
         Symbol in italics, with Greek letters, subscripts and superscripts.
     """
-    if "$" not in formula:
-        return HtmlMarkup(HtmlMarkup.escape(formula))
-    text = HtmlMarkup.escape(formula.strip("$"))
-    text = re.sub(r"\\([A-Za-z]+)", lambda found: _html_character_entity(found[1]), text)
-    text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _format_html_script, text)
+    if "$" not in latex_symbol:
+        return HtmlMarkup(HtmlMarkup.escape(latex_symbol))
+    text = HtmlMarkup.escape(latex_symbol.strip("$"))
+    text = re.sub(r"\\([A-Za-z]+)", lambda found: _find_html_character(found[1]), text)
+    text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _format_sub_or_superscript_as_html, text)
     bare = re.sub(r"[{}]|\\.", "", text)
     return HtmlMarkup(f"<i>{bare}</i>")
 
 
-def html_unit(quantity: Quantity) -> HtmlMarkup:
+def format_unit_as_html(quantity: Quantity) -> HtmlMarkup:
     """Format the unit of a quantity in HTML.
 
     Parameters
@@ -403,24 +406,24 @@ def html_unit(quantity: Quantity) -> HtmlMarkup:
     """
     if quantity.scale:
         scale = quantity.scale.replace("sigma", r"\sigma")
-        return html_symbol(f"${scale}$")
+        return format_symbol_as_html(f"${scale}$")
     return HtmlMarkup(HtmlMarkup.escape(quantity.units if quantity.units != "1" else ""))
 
 
-def _html_character_entity(character_name: str) -> str:
+def _find_html_character(latex_command: str) -> str:
     """Return the character of a LaTeX command.
 
     LaTeX and HTML use the same names for many letters and signs. Function names are returned
     unchanged, and unknown commands are removed.
     """
     return (
-        character_name
-        if character_name in _FUNCTION_NAMES_IN_FORMULAS
-        else html5.get(f"{character_name};", "")
+        latex_command
+        if latex_command in _FUNCTION_NAMES_IN_FORMULAS
+        else html5.get(f"{latex_command};", "")
     )
 
 
-def _format_html_script(match: re.Match[str]) -> str:
+def _format_sub_or_superscript_as_html(match: re.Match[str]) -> str:
     """Format a subscript or superscript in HTML."""
     tag = _HTML_TAG_BY_SUB_OR_SUPERSCRIPT_MARK[match[1]]
     return f"<{tag}>{match[2] if match[2] is not None else match[3]}</{tag}>"

@@ -19,18 +19,25 @@ from rsfstudy.limit_cycles.limit_cycle import (
     INDEX_OF_PEAK_SLIP_RATE_OUTPUT,
     INITIAL_PERTURBATION_DISPLACEMENT,
     STEADY_SLIDING_OUTCOME,
+    build_outcome_of_aperiodic_motion,
+    determine_status_from_output_errors,
     estimate_primary_output_errors,
-    outcome_of_aperiodic_motion,
-    status_from_output_errors,
 )
-from rsfstudy.limit_cycles.limit_cycle_search import StickSlipSequence, follow_to_periodic_orbit
+from rsfstudy.limit_cycles.limit_cycle_search import (
+    StickSlipSequence,
+    follow_motion_to_periodic_orbit,
+)
 from rsfstudy.limit_cycles.return_map import (
     DIFFERENCE_STEP_OVER_LOG_RATE_RANGE,
     PeriodicOrbit,
     ReturnMap,
-    section_coordinates_at_point,
+    extract_section_coordinates,
 )
-from rsfstudy.limit_cycles.stick_slip_cycles import LN10, Cycle, suggest_raising_event_limit
+from rsfstudy.limit_cycles.stick_slip_cycles import (
+    LN10,
+    StickSlipCycle,
+    suggest_raising_event_limit,
+)
 from rsfstudy.measure_base import check_loading_changes_stress_only_in_steps
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
 from rsfstudy.motion import Integrator
@@ -184,7 +191,7 @@ class Bifurcation(Measure):
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_perturbed:
             scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
-        motion = follow_to_periodic_orbit(
+        motion = follow_motion_to_periodic_orbit(
             scene, integrator, self.transient + self.events, follow_all_cycles=True
         )
         if motion is None:
@@ -192,21 +199,26 @@ class Bifurcation(Measure):
         values = self._event_outputs(scene, motion.cycles[-self.events :])
         status, why, of_one = _one_event_cycle_outputs(scene, integrator, motion)
         values |= of_one
-        if motion.orbit is None:
+        if motion.approached_periodic_orbit is None:
             growth = _mean_growth(ReturnMap(scene, integrator), motion.cycles, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
             remedy = suggest_raising_event_limit(max(self.transient, self.events), "transient")
-            ended = outcome_of_aperiodic_motion(scene, motion, remedy)
+            ended = build_outcome_of_aperiodic_motion(scene, motion, remedy)
             if status is Status.OK:
                 status, why = ended.status, ended.message
             return Outcome(status, values, why)
-        values["lyapunov_exponent"] = _lyapunov_exponent(motion.orbit)
-        values |= {"period_events": float(motion.orbit.period), "period_events_error": 0.0}
+        values["lyapunov_exponent"] = _lyapunov_exponent(motion.approached_periodic_orbit)
+        values |= {
+            "period_events": float(motion.approached_periodic_orbit.period_in_cycles),
+            "period_events_error": 0.0,
+        }
         if status is Status.OK and "one_event_log10_peak" not in values:
             why = "the motion does not approach a cycle with one event"
         return Outcome(status, values, why)
 
-    def _event_outputs(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
+    def _event_outputs(
+        self, scene: Scene, seen: Sequence[StickSlipCycle]
+    ) -> dict[str, float | np.ndarray]:
         """Return the results of the recorded events."""
         peaks = np.array([cycle.max_log_slip_rate / LN10 for cycle in seen])
         return {
@@ -262,7 +274,7 @@ def _one_event_cycle_outputs(
         ),
         "one_event_log10_peak_error": float(errors[INDEX_OF_PEAK_SLIP_RATE_OUTPUT]),
     }
-    return *status_from_output_errors(
+    return *determine_status_from_output_errors(
         integrator,
         one,
         errors,
@@ -270,7 +282,7 @@ def _one_event_cycle_outputs(
     ), values
 
 
-def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
+def _mean_growth(by: ReturnMap, seen: Sequence[StickSlipCycle], kept: int) -> tuple[float, float]:
     """Compute the mean logarithmic growth of small perturbations per event.
 
     Before the growth is averaged, the perturbation is followed over several events until it is
@@ -299,13 +311,16 @@ def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float
         * by.scene.a
         * max(cycle.log_slip_rate_range for cycle in seen)
     )
-    departure, grown = np.ones(len(section_coordinates_at_point(seen[0].start_point))), []
+    departure, grown = np.ones(len(extract_section_coordinates(seen[0].start_point))), []
     for cycle in seen:
         start, offset = (
-            section_coordinates_at_point(cycle.start_point),
+            extract_section_coordinates(cycle.start_point),
             step * departure / np.linalg.norm(departure),
         )
-        ahead, behind = by.follow_one_cycle(start + offset), by.follow_one_cycle(start - offset)
+        ahead, behind = (
+            by.follow_one_cycle_to_next_section(start + offset),
+            by.follow_one_cycle_to_next_section(start - offset),
+        )
         if ahead is None or behind is None:
             return math.nan, math.nan
         departure = (ahead - behind)[: len(start)] / (2.0 * step)
@@ -316,7 +331,7 @@ def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float
     return float(np.mean(grown)), float(np.std(means, ddof=1) / math.sqrt(len(means)))
 
 
-def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> PeriodicOrbit | None:
+def _find_one_event_cycle(by: ReturnMap, seen: Sequence[StickSlipCycle]) -> PeriodicOrbit | None:
     """Find the period-one cycle near the motion.
 
     Parameters
@@ -334,8 +349,8 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> PeriodicOrbit
     for near in _closest_returns(seen):
         # After a period doubling, successive events alternate between the two sides of the cycle.
         midpoint = 0.5 * (
-            section_coordinates_at_point(near.start_point)
-            + section_coordinates_at_point(near.end_point)
+            extract_section_coordinates(near.start_point)
+            + extract_section_coordinates(near.end_point)
         )
         orbit = by.find_periodic_orbit(
             midpoint, 1, near.log_slip_rate_range, max_distance=_MAX_GUESS_DISTANCE
@@ -345,7 +360,7 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> PeriodicOrbit
     return None
 
 
-def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
+def _closest_returns(seen: Sequence[StickSlipCycle]) -> list[StickSlipCycle]:
     """Return the cycles that almost repeat, in order of increasing mismatch.
 
     Cycles in the first half of the motion are ignored. A cycle almost repeats if the states at its
@@ -353,7 +368,7 @@ def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
     state over the cycle, relative to the range of ln V.
     """
 
-    def off(cycle: Cycle) -> float:
+    def off(cycle: StickSlipCycle) -> float:
         """Return the relative change of the states over a cycle."""
         apart = np.subtract(cycle.end_point.psis, cycle.start_point.psis)
         return float(np.abs(apart).max()) / cycle.log_slip_rate_range
@@ -364,4 +379,4 @@ def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
 def _lyapunov_exponent(orbit: PeriodicOrbit) -> float:
     """Return the Lyapunov exponent of a periodic orbit."""
     size = float(abs(orbit.floquet_multipliers[0]))
-    return math.log(size) / orbit.period if size else -math.inf
+    return math.log(size) / orbit.period_in_cycles if size else -math.inf

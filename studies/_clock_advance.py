@@ -246,10 +246,10 @@ def _find_free_cycle(
     """
     nudged = free.with_segment(Segment(free.load_velocity, START_DISPLACEMENT_STEP))
     approach = LimitCycleSearch(nudged, integrator)
-    if not approach.follow_until_converged(MAX_EVENTS):
+    if not approach.follow_cycles_until_converged(MAX_EVENTS):
         return None
     start = ReturnMap(free, integrator).section_coordinates_to_point(
-        approach.orbit.start_section_coordinates
+        approach.last_cycle_as_periodic_orbit.start_section_coordinates
     )
     motion = integrator.follow(free, _event_specifications(free), start=start, with_time=True)
     begin = next(motion).point  # The first event holds the fully evaluated point.

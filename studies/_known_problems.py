@@ -203,7 +203,7 @@ class ProblemMeasure(Measure):
         )
         for number, each in enumerate(listed):
             if each not in known:
-                raise plain_data.invalid_part_error(
+                raise plain_data.build_invalid_entry_error(
                     f"{path}.problems[{number}]", "does not belong to a study"
                 )
         return {"problems": tuple(REGISTERED_PROBLEMS[known.index(each)] for each in listed)}

@@ -23,7 +23,7 @@ from rsfstudy.motion import Event, Integrator
 from rsfstudy.responses import estimate_errors_at_instants
 from rsfstudy.slider import MotionPoint
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
-from rsfstudy.slider.stability import spring_response_to_normal_stress
+from rsfstudy.slider.stability import compute_spring_response_to_normal_stress
 
 #: Remaining transient at the beginning of the record, relative to the requested accuracy. The
 #: remaining transient is computed from the slowest decay rate of small perturbations.
@@ -330,7 +330,7 @@ class NormalStressResponse(RecordingMeasure):
             why = "steady sliding is unstable, so transients do not decay"
             return Outcome(Status.NOT_APPLICABLE, message=why)
         period = loading.oscillation_period
-        linear = spring_response_to_normal_stress(
+        linear = compute_spring_response_to_normal_stress(
             scene, scene.log_load_velocity, 2.0 * math.pi / period
         )
         by_theory = {"linear_gain": abs(linear), "linear_phase_lead": _phase_in_degrees(linear)}

@@ -103,7 +103,7 @@ class _TransientRecord(NamedTuple):
     @property
     def final_friction(self) -> float:
         """Friction at the end of the record."""
-        return float(Recording.friction_coefficient(self.rows[-1:])[0])
+        return float(Recording.get_friction_coefficient(self.rows[-1:])[0])
 
     def remaining_transient(self, slip: float) -> float:
         """Return the remaining transient of friction at a slip.
@@ -290,10 +290,10 @@ class NormalStressTransient(RecordingMeasure):
             scene, with_time=True, recording=recording, until=self.record
         )
         rows = recording.as_table(scene)
-        slip = rows[:, Recording.MOTION_VARIABLES.index("slip")]
+        slip = rows[:, Recording.MOTION_VARIABLE_NAMES.index("slip")]
         if slip.max() < max(self.fit_to, 1.0):
             return None
-        rate = rows[:, Recording.MOTION_VARIABLES.index("log10_slip_rate")]
+        rate = rows[:, Recording.MOTION_VARIABLE_NAMES.index("log10_slip_rate")]
         taken_up = (
             abs(np.interp(self.fit_from, slip, rate)) * math.log(10.0) <= _SPRING_RESPONSE_LOG_RATE
         )
@@ -316,7 +316,9 @@ class NormalStressTransient(RecordingMeasure):
         for slip in sorted({self.fit_from, 1.0, self.fit_to}):
             wait = (
                 float(
-                    np.interp(slip, rows[:, Recording.MOTION_VARIABLES.index("slip")], rows[:, 0])
+                    np.interp(
+                        slip, rows[:, Recording.MOTION_VARIABLE_NAMES.index("slip")], rows[:, 0]
+                    )
                 )
                 - elapsed
             )
@@ -390,13 +392,13 @@ class NormalStressTransient(RecordingMeasure):
         self, scene: Scene, record: _TransientRecord
     ) -> dict[str, float | np.ndarray]:
         """Return the recorded variables, and the results that need no exponential fit."""
-        rows, friction = record.rows, Recording.friction_coefficient(record.rows)
+        rows, friction = record.rows, Recording.get_friction_coefficient(record.rows)
         late = rows[:, 0] >= (1.0 - _FINAL_SHARE) * self.record
         is_flat = bool(
             np.ptp(friction[late])
             < _FINAL_FRICTION_RTOL * abs(record.remaining_transient(self.fit_from))
         )
-        path = resample_motion_along_path(rows, self.phases, Recording.VARIABLES)
+        path = resample_motion_along_path(rows, self.phases, Recording.VARIABLE_NAMES)
         return {
             "direct_change": _direct_change(scene, record),
             "settled": compute_settled_friction_flag(scene.segment_scene(-1), is_flat=is_flat),
@@ -431,13 +433,13 @@ class NormalStressTransient(RecordingMeasure):
         law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
         if law.relaxation is None or law.depends_on_stress or coupling is None:
             return math.nan
-        slip = record.rows[:, Recording.MOTION_VARIABLES.index("slip")]
+        slip = record.rows[:, Recording.MOTION_VARIABLE_NAMES.index("slip")]
         read = slip >= self.fit_from
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         # If b is zero, alpha is zero too, and friction does not evolve.
         away = -coupling[1] / scene.b * math.log(ratio) if scene.b else 0.0
         left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
-        seen = Recording.friction_coefficient(record.rows[read]) - scene.mu_star
+        seen = Recording.get_friction_coefficient(record.rows[read]) - scene.mu_star
         return float(np.abs(seen - scene.b * left).max())
 
 

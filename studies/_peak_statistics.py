@@ -24,15 +24,17 @@ class PeakStatistics(EventStatistics):
 
     name: ClassVar[str] = "peak_statistics"
 
-    def _events(self, scene: Scene, integrator: Integrator, cycles: int) -> list[_Event]:
+    def _list_events_delimiting_cycles(
+        self, scene: Scene, integrator: Integrator, cycle_count: int
+    ) -> list[_Event]:
         """Return the events that delimit the intervals.
 
         See ``EventStatistics``.
         """
         if scene.parts.loading_noise.is_active:
-            return super()._events(scene, integrator, cycles)
+            return super()._list_events_delimiting_cycles(scene, integrator, cycle_count)
         first = self.discarded_cycles
-        return list(islice(_iterate_peaks(scene, integrator), first, first + cycles + 1))
+        return list(islice(_iterate_peaks(scene, integrator), first, first + cycle_count + 1))
 
 
 def _iterate_peaks(scene: Scene, integrator: Integrator) -> Iterator[_Event]:

@@ -12,8 +12,8 @@ import xarray as xr
 
 from rsfstudy import Scene
 from rsfstudy.slider import SceneFields
-from rsfstudy.study import find_named_user_parts
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study import find_user_parts_in_axis_rows
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 LN10 = math.log(10.0)
 
@@ -52,13 +52,13 @@ def scene_from_coordinates(cell: xr.Dataset) -> Scene:
         Scene with the values of the coordinates.
     """
     here = {str(name): cell[name].item() for name in cell.coords if cell[name].ndim == 0}
-    parts = find_named_user_parts(here, [here])
-    kinds = SceneFields.types_with_user_parts(parts.values())
+    parts = find_user_parts_in_axis_rows(here, [here])
+    kinds = SceneFields.collect_types_with_user_parts(parts.values())
     # Coordinates that do not apply to the cell are NaN or an empty string.
     values = {n: v for n, v in here.items() if n in kinds and v == v and v != ""}
     flags = [name for name in values if kinds[name] in (bool, bool | None)]
     values |= {name: bool(values[name]) for name in flags}
-    for name in SceneFields.find_inapplicable(Scene().as_dict() | values, parts.values()):
+    for name in SceneFields.find_inapplicable_fields(Scene().as_dict() | values, parts.values()):
         values.pop(name, None)
     return Scene(**values)
 
@@ -106,11 +106,11 @@ def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray)
 
 def _stresses_from_friction(scene: Scene, excesses: np.ndarray) -> np.ndarray:
     """Compute shear stresses from deviations of the friction coefficient from mu_*."""
-    stresses = (scene.frictional_stress_for_friction(excess) for excess in excesses.tolist())
+    stresses = (scene.frictional_stress_from_friction(excess) for excess in excesses.tolist())
     return np.array([math.nan if g is None else scene.mu_star + g for g in stresses])
 
 
-def plot_steady_line(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_steady_line(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the line of steady sliding over the range of the axes.
 
     Parameters
@@ -127,7 +127,7 @@ def plot_steady_line(dataset: xr.Dataset, axes: Axes) -> None:
     axes.set(xlim=reach, ylim=height)
 
 
-def hatch_reversed_stress(_dataset: xr.Dataset, axes: Axes) -> None:
+def hatch_reversed_stress(_dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Hatch the area of negative shear stress if this area is visible.
 
     The friction laws apply to forward slip only, so results with negative shear stress are not

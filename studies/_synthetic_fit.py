@@ -24,12 +24,12 @@ from rsfstudy.fitting import (
     scene_to_parameters,
     strip_window_number,
 )
-from rsfstudy.fitting.confidence_intervals import LikelihoodProfile, student_t_multiplier
+from rsfstudy.fitting.confidence_intervals import LikelihoodProfile, compute_student_t_quantile
 from rsfstudy.fitting.fit_problem import FitProblem
 from rsfstudy.fitting.fit_solution import FitSolution
-from rsfstudy.fitting.fit_validity_checks import find_validity_problems
-from rsfstudy.fitting.joint_model import JointModel, add_window_numbers
-from rsfstudy.fitting.noise import check_noise_name
+from rsfstudy.fitting.fit_validity_checks import find_reasons_for_invalid_stderrs
+from rsfstudy.fitting.joint_model import JointModel, add_window_numbers_to_parameter_names
+from rsfstudy.fitting.noise import check_noise_model_name
 from rsfstudy.fitting.window_model import ParameterValues, WindowModel, check_fields_positive
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
 from rsfstudy.motion import Integrator
@@ -183,7 +183,7 @@ class SyntheticFit(Measure):
             raise InvalidValue("rows", self.rows, "must be at least ten per segment")
         if self.seed < 0:
             raise InvalidValue("seed", self.seed, "must be 0 or greater")
-        check_noise_name(self.noise)
+        check_noise_model_name(self.noise)
 
     @property
     def outputs(self) -> Sequence[Output]:
@@ -208,7 +208,7 @@ class SyntheticFit(Measure):
     @property
     def _free_parameters(self) -> tuple[str, ...]:
         """Names of the free parameters, with a number for each window."""
-        return add_window_numbers(self.free, len(self._window_segments()))
+        return add_window_numbers_to_parameter_names(self.free, len(self._window_segments()))
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Draw a synthetic record, and fit the record.
@@ -229,12 +229,12 @@ class SyntheticFit(Measure):
             return self._fit_noisy_record(scene, integrator)
         true = self._exact_parameters(scene)
         truth = self._joint_model(scene, integrator)
-        clean = truth.model_friction(true)
+        clean = truth.compute_model_friction(true)
         if not np.isfinite(clean).all():
             return Outcome(Status.NOT_APPLICABLE, message="the true motion cannot be computed")
         rng, size = np.random.default_rng(self.seed), self.noise_size
         root = _noise_factor(self.process, self.rows)
-        noise = np.concatenate([root @ rng.standard_normal(self.rows) for _ in truth.models])
+        noise = np.concatenate([root @ rng.standard_normal(self.rows) for _ in truth.window_models])
         fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
         model = self._joint_model(fitted, integrator, clean + size * noise)
         search = FitProblem(
@@ -242,7 +242,7 @@ class SyntheticFit(Measure):
         )
         found = search.solve()
         promised = self._expected_stderrs(truth, true)
-        reasons = find_validity_problems(found, model.friction)
+        reasons = find_reasons_for_invalid_stderrs(found, model.recorded_friction)
         return Outcome(Status.OK, self._compare_with_exact(search, found, true, promised, reasons))
 
     def _fit_noisy_record(self, scene: Scene, integrator: Integrator) -> Outcome:
@@ -267,9 +267,9 @@ class SyntheticFit(Measure):
                 (before.duration, after.velocity, 1.0, 0.0),
             ]
             zeros = np.zeros(len(time))
-            return WindowModel(scene, time, zeros, zeros, np.array(pieces), smooth).model_friction(
-                true
-            )
+            return WindowModel(
+                scene, time, zeros, zeros, np.array(pieces), smooth
+            ).compute_model_friction(true)
 
         ends = before.duration + after.duration
         step = before.duration, ends, before.velocity, after.velocity
@@ -299,12 +299,12 @@ class SyntheticFit(Measure):
             naive = FitProblem(
                 search.model, found.parameter_values, self._free_parameters, "white"
             ).solve()
-        exact = search.values_to_coordinates(true)
+        exact = search.parameter_values_to_fit_coordinates(true)
         profiles = [LikelihoodProfile(search, found, name) for name in self._free_parameters]
         # Noise of the load point displacement widens the intervals in proportion.
         wider = np.array(
             [
-                found.coordinate_stderr[one.parameter_index] / one.stderr_from_noise
+                found.fit_coordinate_stderr[one.parameter_index] / one.stderr_from_noise
                 for one in profiles
             ]
         )
@@ -312,14 +312,17 @@ class SyntheticFit(Measure):
         each = zip(profiles, nearer.tolist(), strict=True)
         squared = [one.compute_twice_log_likelihood_decrease(x) for one, x in each]
         naively = np.square(
-            (search.values_to_coordinates(naive.parameter_values) - exact) / naive.coordinate_stderr
+            (search.parameter_values_to_fit_coordinates(naive.parameter_values) - exact)
+            / naive.fit_coordinate_stderr
         )
         by_parameter = {
-            "estimate": search.values_to_coordinates(found.parameter_values),
-            "deviation": search.values_to_coordinates(found.parameter_values) - exact,
-            "deviation_error": np.array([found.numerical_errors[n] for n in self._free_parameters])
-            / found.parameter_derivatives_by_coordinates,
-            "spread": found.coordinate_stderr,
+            "estimate": search.parameter_values_to_fit_coordinates(found.parameter_values),
+            "deviation": search.parameter_values_to_fit_coordinates(found.parameter_values) - exact,
+            "deviation_error": np.array(
+                [found.parameter_numerical_errors[n] for n in self._free_parameters]
+            )
+            / found.parameter_derivatives_by_fit_coordinates,
+            "spread": found.fit_coordinate_stderr,
             "promised_spread": promised,
             "told": np.array(
                 [float(n not in found.unidentified_parameters) for n in self._free_parameters]
@@ -327,7 +330,7 @@ class SyntheticFit(Measure):
         }
         for words, share in (("one", SHARE_WITHIN_ONE_STDERR), ("two", SHARE_WITHIN_TWO_STDERRS)):
             for prefix, of, far in (("", found, squared), ("naive_", naive, naively)):
-                inside = np.array(far) <= student_t_multiplier(of, share) ** 2
+                inside = np.array(far) <= compute_student_t_quantile(of, share) ** 2
                 by_parameter[f"{prefix}inside_{words}"] = inside.astype(float)
         # If a parameter has a separate value in each window, the first window is reported.
         shown = [
@@ -347,7 +350,7 @@ class SyntheticFit(Measure):
         longer = self.slip_distance * (scene.as_dict().get("length_ratio") or 1.0)
         plainly = scene_to_parameters(scene, self.slip_distance, longer)
         plainly |= {name: 0.0 for name in self.free if name not in plainly}
-        names = add_window_numbers(tuple(plainly), len(self._window_segments()))
+        names = add_window_numbers_to_parameter_names(tuple(plainly), len(self._window_segments()))
         return {name: plainly[strip_window_number(name)] for name in names}
 
     def _initial_parameters(self, scene: Scene, true: ParameterValues) -> dict[str, float]:
@@ -383,7 +386,7 @@ class SyntheticFit(Measure):
     def _expected_stderrs(self, truth: JointModel, true: ParameterValues) -> np.ndarray:
         """Compute standard errors from the Fisher information and the known noise."""
         correlations = _correlations(self.process, self.rows)
-        jacobian = truth.jacobian(true, self._free_parameters)
+        jacobian = truth.compute_jacobian(true, self._free_parameters)
         information = np.zeros((len(self._free_parameters),) * 2)
         for first in range(0, len(jacobian), self.rows):
             part = jacobian[first : first + self.rows]

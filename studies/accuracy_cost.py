@@ -33,7 +33,7 @@ from rsfstudy.measures import (
 from rsfstudy.motion import Engine, Integrator, WorkMeter
 from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
 from rsfstudy.reductions import LinearFit
-from rsfstudy.study.figure_declarations import Axes, horizontal_line, reference_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line, reference_line
 
 from . import _reference_values as known
 from ._cheapest_integrator import CheapestIntegrator
@@ -235,8 +235,8 @@ class WorkPrecision(ProblemMeasure):
             integrator.work_meter.add_evaluations(regime, evaluations)
         work = {
             "run_evaluations": float(spent.evaluations),
-            "run_steps": float(spent.steps),
-            "run_jacobians": float(spent.jacobians),
+            "run_steps": float(spent.step_count),
+            "run_jacobians": float(spent.jacobian_evaluations),
         }
         if outcome.status is not problem.status:
             why = f"{outcome.status.label}: {outcome.message}"
@@ -318,7 +318,7 @@ def _time_run(problem: Problem, scene: Scene, asked: Accuracy) -> tuple[float, O
 DEFAULT_INTEGRATOR = "DOP853"
 
 
-def plot_unreachable_accuracy(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_unreachable_accuracy(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the uncertainty of the known answer, and mark the failed runs.
 
     Failed runs are marked with crosses at the requested accuracy.

@@ -20,8 +20,8 @@ from scipy.interpolate import CubicSpline
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import Quantity, StepResponse
 from rsfstudy.reductions import Difference, Reduction
-from rsfstudy.study import failed_cell_mask
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study import is_failed_or_pending
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._paper import PAPER, REFERENCE
 from ._phase_plane import hatch_reversed_stress, plot_steady_line
@@ -91,7 +91,7 @@ class PathSeparation(Reduction):
         if dataset.sizes.get(self.along, 0) != 2:
             return xr.Dataset()
         dataset = dataset.sortby(self.along)  # The path without the effect comes first.
-        bad = failed_cell_mask(dataset["status"]).any(self.along)
+        bad = is_failed_or_pending(dataset["status"]).any(self.along)
         core = [self.along, "phase"]
         parting, merging, offset = xr.apply_ufunc(
             self._compare,
@@ -195,7 +195,7 @@ orbit_panel = Panel(
 )
 
 
-def plot_separation(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_separation(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw lines at the slip rates at which the paths separate and merge.
 
     Parameters

@@ -25,7 +25,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
 from rsfstudy.motion import Accuracy, Integrator
 from rsfstudy.reductions import Reduction
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._random_scenes import ALL_QUESTIONS, MOTION_QUESTIONS, random_scene
 
@@ -263,7 +263,7 @@ class CoverageStatistics(Reduction):
 PLOTTED_ERROR_RATIOS = (1e-3, 10.0)
 
 
-def plot_error_histogram(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_error_histogram(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw one histogram of error ratios per requested accuracy.
 
     Parameters

@@ -14,7 +14,7 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import LinearStability
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 
@@ -128,7 +128,7 @@ def drained_critical_stiffness(dataset: xr.Dataset) -> float:
     return float(dataset["a"]) * (float(dataset["b_over_a"]) - 1.0)
 
 
-def plot_limits(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_limits(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the drained limit of k_cr, and the undrained limits at the left.
 
     Parameters

@@ -14,7 +14,7 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import LimitCycle
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 
@@ -60,7 +60,7 @@ def peak_slip_rate_claim(
 LINEAR_TIME_RANGE = 1e-6
 
 
-def plot_undrained_stiffness(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_undrained_stiffness(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw a line at the dilatancy at which k is the undrained critical stiffness.
 
     Parameters
@@ -93,7 +93,7 @@ def time_from_fastest_slip(row: xr.Dataset) -> xr.DataArray:
     return row["time"] - row["time"][fastest]
 
 
-def set_symlog_time_scale(_dataset: xr.Dataset, axes: Axes) -> None:
+def set_symlog_time_scale(_dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Set logarithmic time scales before and after the fastest slip.
 
     Parameters

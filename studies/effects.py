@@ -23,9 +23,9 @@ from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import LimitCycle, Measure, Outcome, Output
 from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.reductions import RelativeDifference
-from rsfstudy.slider import Equations
+from rsfstudy.slider import EquationsOfMotion
 from rsfstudy.study import DrawFunction
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 #: Radiation damping K T V_*/(2 pi D_c). This value equals the impedance of the spring and the mass
 #: at constant normal stress.
@@ -147,7 +147,7 @@ def _measure_costs(scene: Scene) -> dict[str, float]:
         Results by name, for the equations between ruptures and, with inertia, during ruptures.
     """
     slow = scene.equations_between_ruptures(with_time=False)
-    forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _SLOW_UNKNOWNS)}
+    forms: dict[str, tuple[EquationsOfMotion, tuple[float, ...]]] = {"": (slow, _SLOW_UNKNOWNS)}
     if scene.inertia:
         forms["_in_rupture"] = scene.equations_in_rupture(), _RUPTURE_UNKNOWNS
     plainest = scene.with_(
@@ -170,7 +170,7 @@ def _measure_costs(scene: Scene) -> dict[str, float]:
     return costs
 
 
-def _time_right_hand_side(equations: Equations, state: tuple[float, ...]) -> float:
+def _time_right_hand_side(equations: EquationsOfMotion, state: tuple[float, ...]) -> float:
     """Return the processor time of one right-hand-side evaluation in s."""
     rate, p = equations.rate_function, equations.parameters
     state += (0.0,) * (len(equations.unknown_names) - len(state))
@@ -198,7 +198,7 @@ def draw_bars(variable: str, digits: int) -> DrawFunction:
         Function that draws on axes.
     """
 
-    def mark(dataset: xr.Dataset, axes: Axes) -> None:
+    def mark(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
         """Draw the bar chart."""
         from rsfstudy.plots import cycle_style, label_rows
 

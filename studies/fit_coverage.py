@@ -22,7 +22,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.fitting import PARAMETERS as MODEL
 from rsfstudy.reductions import Reduction
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._noise_kinds import NOISE_KINDS
 from ._synthetic_fit import (
@@ -125,7 +125,7 @@ class ShareFlagged(Reduction):
         return xr.Dataset({self.name: dataset[self.of].mean("seed")})
 
 
-def plot_shares(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_shares(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Plot the fraction of intervals with the exact value by kind of noise.
 
     Each parameter has a different marker. Full markers show the intervals of the fit, and open

@@ -26,7 +26,7 @@ from rsfstudy.fitting.joint_model import JointModel
 from rsfstudy.fitting.window_model import ParameterValues, WindowModel
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
 from rsfstudy.motion import Integrator
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._synthetic_fit import FIT_ACCURACY
 
@@ -163,7 +163,7 @@ class RecoveryError(Measure):
         smooth = integrator.tightened_to(MOTION_RTOL)
         model = self._record_model(scene, smooth)
         made = (
-            model.model_friction(true)
+            model.compute_model_friction(true)
             if self.record_by == "the model"
             else _friction_by_scipy(model, true)
         )
@@ -178,7 +178,7 @@ class RecoveryError(Measure):
         values: dict[str, OutputValue] = {
             "largest_deviation": max(map(abs, off.values())),
             "largest_deviation_error": max(
-                found.numerical_errors[name] / sizes[name] for name in free
+                found.parameter_numerical_errors[name] / sizes[name] for name in free
             ),
             "deviation": np.array([off.get(name, math.nan) for name in PARAMETERS]),
         }
@@ -307,7 +307,7 @@ CASES = {
 }
 
 
-def plot_allowed_deviations(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_allowed_deviations(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw lines at the maximum deviations that the claims permit.
 
     Parameters

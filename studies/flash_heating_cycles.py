@@ -14,7 +14,7 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import LimitCycle
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._heat import FLASH_FAULT, FLASH_REFERENCES, INDEPENDENT, RICE, known_value_claim
 
@@ -45,7 +45,7 @@ def cycle_claim(variable: str, velocity: float, friction: float, value: float) -
     return known_value_claim("H5", statement, variable, where, value, tolerance)
 
 
-def plot_complete_drop(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_complete_drop(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the difference between the friction at V_* and the weakened friction.
 
     Parameters

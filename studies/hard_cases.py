@@ -28,7 +28,7 @@ from rsfstudy.measures import (
     Triggered,
 )
 from rsfstudy.motion import Integrator
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from . import _reference_values as known
 from ._known_problems import ERROR_OUTPUTS, Fields, Problem, ProblemMeasure, register_problem
@@ -384,7 +384,7 @@ add_status_case(
 )
 
 
-def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
+def name_cases(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Label the rows of the figure with the names of the cases.
 
     Parameters
@@ -402,7 +402,7 @@ def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
         axes.set_xscale("log")
 
 
-def write_text(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
+def write_text(axes: MatplotlibAxes, row: int, text: str, color: str = "0.35") -> None:
     """Write text in a row.
 
     Parameters
@@ -420,7 +420,7 @@ def write_text(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
     axes.text(0.02, row, text, color=color, **across)
 
 
-def plot_errors(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_errors(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw measured errors as filled markers, and error estimates as open markers.
 
     If a case has no error to plot, a label shows the name of its status or the word "exact".
@@ -452,7 +452,7 @@ def plot_errors(dataset: xr.Dataset, axes: Axes) -> None:
     name_cases(dataset, axes)
 
 
-def plot_work(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_work(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the number of right-hand-side evaluations of each case.
 
     Parameters

@@ -25,14 +25,14 @@ from rsfstudy.measures import Measure, Outcome, Output, Status
 from rsfstudy.motion import Integrator, Recording
 from rsfstudy.slider import SampledHistory
 from rsfstudy.slider.sampled_loading import TIME_COLUMN
-from rsfstudy.study.figure_declarations import Axes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
 
 #: Initial perturbation of spring stress relative to ``a``. The second value is the sampling
 #: interval in D_c/V_*. The third value is the half-width of the window around an extremum, as a
 #: fraction of the length of the record.
 INITIAL_DEPARTURE, SAMPLING_INTERVAL, EXTREMUM_WINDOW = 1e-5, 0.25, 1.0 / 16.0
 
-LOG_SLIP_RATE_COLUMN = Recording.MOTION_VARIABLES.index("log10_slip_rate")
+LOG_SLIP_RATE_COLUMN = Recording.MOTION_VARIABLE_NAMES.index("log10_slip_rate")
 GROWTH_ENDS, GROWTH_BEGINS = "end", "begin"
 _GROWTH_DESCRIPTIONS = {
     GROWTH_ENDS: "stop growing as pressure increases",
@@ -443,7 +443,7 @@ def pressure_panel(at: str) -> Panel:
     )
 
 
-def plot_critical_pressure(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_critical_pressure(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the critical pressure at V_0 as a function of drainage.
 
     The value of a drained fault is drawn as a dotted line.
@@ -482,7 +482,7 @@ def pressure_rates(row: xr.Dataset) -> xr.DataArray:
     )
 
 
-def plot_one_to_one_line(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_one_to_one_line(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw a line that shows the change of pressure during a time of D_c/V_*.
 
     Parameters

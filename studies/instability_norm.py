@@ -16,7 +16,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reductions import Inverse
-from rsfstudy.study.figure_declarations import Axes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
 
 from ._paper import PAPER, REFERENCE
 
@@ -45,7 +45,7 @@ BOUNDARIES: dict[str, dict[str, str | float]] = {
 }
 
 
-def plot_norm(_dataset: xr.Dataset, axes: Axes) -> None:
+def plot_norm(_dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw a line at the instability norm that the other studies use.
 
     Parameters
@@ -59,7 +59,7 @@ def plot_norm(_dataset: xr.Dataset, axes: Axes) -> None:
     axes.axvline(5e-4, label="norm of our studies", **grey)
 
 
-def plot_published_norms(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_published_norms(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the instability norms that the published critical steps imply.
 
     Parameters

@@ -19,7 +19,7 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._gualandi import (
     NORMAL_STRESSES,
@@ -131,7 +131,7 @@ def interval_cv(row: xr.Dataset) -> xr.DataArray:
     return 100.0 * row["recurrence_interval_cv"]
 
 
-def plot_published(_dataset: xr.Dataset, axes: Axes) -> None:
+def plot_published(_dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the CV of the stochastic model of the paper and of the experiments.
 
     Parameters

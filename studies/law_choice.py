@@ -15,7 +15,7 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.reductions import Reduction
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._synthetic_fit import (
     BASE_SCENE,
@@ -86,7 +86,7 @@ class LawChoiceShares(Reduction):
         )
 
 
-def plot_shares(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_shares(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw bars with the fractions of correct, undecided and wrong choices.
 
     Parameters

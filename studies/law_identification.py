@@ -18,8 +18,8 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.reductions import Reduction
-from rsfstudy.study.figure_declarations import Axes
-from rsfstudy.study.reductions.base import DerivativesByVariable
+from rsfstudy.study.figure_declarations import MatplotlibAxes
+from rsfstudy.study.reductions.base import DerivativesWithCellCoordinates
 
 from ._synthetic_fit import (
     BASE_SCENE,
@@ -88,7 +88,7 @@ class ScatterRatio(Reduction):
         off = (found - 1.0) * math.sqrt(2.0 * self._record_dimensions(dataset))
         return xr.Dataset({self.name: found, f"{self.name}_off": off})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Return the derivatives of the ratio with respect to the deviations.
 
         Parameters
@@ -109,7 +109,7 @@ class ScatterRatio(Reduction):
         return math.prod(dataset.sizes[name] for name in self.over)
 
 
-def plot_estimates(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_estimates(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the estimates of the exponent and the expected standard errors.
 
     Parameters

@@ -21,7 +21,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reductions import ClosedFormRatio, RelativeDifference
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._laws import (
     COMPOSITE,
@@ -137,7 +137,7 @@ def variable_normal_stress_claim(law: str, published: float) -> Claim:
     )
 
 
-def plot_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_closed_forms(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw open circles at the critical steps from the closed form.
 
     Parameters

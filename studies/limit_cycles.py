@@ -16,7 +16,7 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import LimitCycle
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._paper import PAPER, REFERENCE
 from ._phase_plane import (
@@ -85,7 +85,7 @@ def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
     return list(found.values())
 
 
-def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_orbits(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw stress against slip rate, with lines of steady and constant state.
 
     The relation between normal stress and shear stress may differ between cells. The line of steady
@@ -136,14 +136,14 @@ def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
             )
 
 
-def _axes_fractions(axes: Axes, x: Any, y: Any) -> np.ndarray:
+def _axes_fractions(axes: MatplotlibAxes, x: Any, y: Any) -> np.ndarray:
     """Convert data coordinates to fractions of the axes."""
     panel = axes.transData + axes.transAxes.inverted()
     return np.asarray(panel.transform(np.column_stack([np.asarray(x), np.asarray(y)])))
 
 
 def _label_line(
-    axes: Axes, line: np.ndarray, number: str, colour: str, taken: Sequence[np.ndarray]
+    axes: MatplotlibAxes, line: np.ndarray, number: str, colour: str, taken: Sequence[np.ndarray]
 ) -> np.ndarray:
     """Place the label of a line where it is visible and far from other points.
 
@@ -178,7 +178,7 @@ def _label_line(
     return np.asarray(place + np.outer(np.linspace(-0.07, 0.07, 5), (1.0, 0.0)))
 
 
-def plot_along_slip(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_along_slip(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw stress against slip over two limit cycles.
 
     Dashed lines show the spring stress during the first cycle, and markers show the point of

@@ -17,7 +17,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import LinearStability
 from rsfstudy.reductions import Inverse, LinearFit
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._paper import PAPER, REFERENCE
 from ._phase_plane import scene_from_coordinates
@@ -116,7 +116,7 @@ def critical_stiffness_curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return np.exp(logs), np.where(stiffnesses > 0.0, stiffnesses, math.nan)
 
 
-def plot_slowest_steady_rate(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_slowest_steady_rate(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw dotted lines at the lowest slip rate of steady sliding.
 
     Parameters

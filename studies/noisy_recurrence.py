@@ -18,7 +18,7 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.reductions import Mean, Reduction
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._phase_response import NoisyRecurrence
 
@@ -132,7 +132,7 @@ def theory_claim(variable: str, value: float, statement: str) -> Claim:
     )
 
 
-def plot_theory(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_theory(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the CV of the theory for weak noise.
 
     Parameters
@@ -148,7 +148,7 @@ def plot_theory(dataset: xr.Dataset, axes: Axes) -> None:
     axes.plot(ends, slope * ends, color="0.4", linestyle="--", label="phase response")
 
 
-def plot_unity(_dataset: xr.Dataset, axes: Axes) -> None:
+def plot_unity(_dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw a line at the ratio 1.
 
     Parameters

@@ -17,7 +17,7 @@ import xarray as xr
 from scipy.integrate import quad
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.study.figure_declarations import Axes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
 
 from ._normal_stress_transient import NormalStressTransient
 from ._phase_plane import scene_from_coordinates
@@ -231,7 +231,7 @@ def friction_change(row: xr.Dataset) -> xr.DataArray:
     return (row["friction_coefficient"] - row["mu_star"]).where(row["slip"] <= PLOTTED_SLIP)
 
 
-def plot_rigid_transients(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_rigid_transients(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the transients of a rigid slider from the closed form of the law.
 
     Parameters

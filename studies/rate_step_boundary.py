@@ -14,7 +14,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reductions import ProportionalFit, RelativeDifference
-from rsfstudy.study.figure_declarations import Axes, reference_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, reference_line
 
 from ._paper import (
     CONSTANT_NORMAL_STRESS,
@@ -51,7 +51,7 @@ def fit_line(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return reach, 1.0 + float(row.get("zeta", np.nan)) * reach
 
 
-def plot_fitted_range(_dataset: xr.Dataset, axes: Axes) -> None:
+def plot_fitted_range(_dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Shade the range of a/(b-a) over which the line is fitted.
 
     Parameters

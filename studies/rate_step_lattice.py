@@ -14,12 +14,12 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import Triggered
 from rsfstudy.reductions import Boundary
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._paper import CONSTANT_NORMAL_STRESS, NORMAL_STRESS_CASES, PAPER, REFERENCE
 
 
-def plot_cells(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_cells(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the boundary, and mark stable cells (open) and unstable cells (filled).
 
     Parameters

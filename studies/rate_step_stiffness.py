@@ -17,7 +17,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reductions import ClosedFormRatio, RelativeDifference
-from rsfstudy.study.figure_declarations import Axes, reference_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, reference_line
 
 from ._paper import (
     CONSTANT_NORMAL_STRESS,
@@ -104,7 +104,7 @@ PAPER_WORDS_ON_UNDERESTIMATE = (
 )
 
 
-def plot_eq_11(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_eq_11(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the approximation of the paper for the slip law.
 
     Parameters

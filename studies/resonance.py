@@ -17,8 +17,8 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.reductions import Inverse
-from rsfstudy.slider.stability import spring_response_to_normal_stress
-from rsfstudy.study.figure_declarations import Axes, horizontal_line
+from rsfstudy.slider.stability import compute_spring_response_to_normal_stress
+from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
 
 from ._normal_stress_response import NormalStressResponse
 from ._phase_plane import scene_from_coordinates
@@ -246,7 +246,8 @@ def linear_theory_line(
     periods = np.geomspace(0.5 * float(known.min()), 2.0 * float(known.max()), 300)
     frequencies = 2.0 * math.pi / periods
     found = [
-        spring_response_to_normal_stress(scene, scene.log_load_velocity, f) for f in frequencies
+        compute_spring_response_to_normal_stress(scene, scene.log_load_velocity, f)
+        for f in frequencies
     ]
     return periods, np.asarray(part(np.array(found)))
 
@@ -285,7 +286,7 @@ def settled_values(variable: str, row: xr.Dataset) -> xr.DataArray:
     return row[variable].where(row["settled"] == 1.0)
 
 
-def plot_linear_theory(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_linear_theory(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw horizontal lines at the gains of linear theory.
 
     Parameters

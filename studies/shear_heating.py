@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import LinearStability
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._heat import (
     HEATED_FAULT,
@@ -88,7 +88,7 @@ def shown_cooling_rates(values: Sequence[float]) -> list[float]:
     return [v for v in values if v in (0.1, 1.0, 10.0, 100.0)] or list(values)
 
 
-def plot_transitions(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_transitions(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw dotted lines at the slip rates of lowest friction, in closed form.
 
     Parameters

@@ -26,9 +26,9 @@ from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import LimitCycle, Quantity, Status
 from rsfstudy.reductions import Boundary, Reduction
-from rsfstudy.study import failed_cell_mask
-from rsfstudy.study.figure_declarations import Axes
-from rsfstudy.study.reductions.base import dimension_of_coordinate, refused_result_mask
+from rsfstudy.study import is_failed_or_pending
+from rsfstudy.study.figure_declarations import MatplotlibAxes
+from rsfstudy.study.reductions.base import depends_on_failed_cells, find_dimension_of_coordinate
 
 from ._paper import GU_ET_AL, PAPER, REFERENCE
 from ._phase_plane import scene_from_coordinates
@@ -112,9 +112,9 @@ class CycleRegionEdge(Reduction):
         InvalidValue
             If ``stiffness_ratio`` is not a coordinate along one dimension.
         """
-        dimension = dimension_of_coordinate(dataset, _STIFFNESS)
+        dimension = find_dimension_of_coordinate(dataset, _STIFFNESS)
         cycles, settles = dataset[self.of].notnull(), dataset["status"] == Status.NO_LIMIT_CYCLE
-        lost = refused_result_mask(dataset, self.of, dimension)
+        lost = depends_on_failed_cells(dataset, self.of, dimension)
         answers = cycles.astype(float).where((cycles | settles) & ~lost)
         linear = _linear_boundary(answers.isel({dimension: 0}, drop=True), dataset)
         if linear is None:
@@ -123,7 +123,7 @@ class CycleRegionEdge(Reduction):
         # The reduction ``Boundary`` returns the first change, so the order is reversed to find the
         # change at the stiffest cells.
         softening = answers.assign_coords({_STIFFNESS: -stiffness})
-        found = Boundary(self.name, self.of, on=_STIFFNESS).bracket(softening)
+        found = Boundary(self.name, self.of, on=_STIFFNESS).bracket_threshold_crossing(softening)
         stable, unstable, crossings = abs(found[0]), abs(found[1]), found[2]
         edge, width = (0.5 * (stable + unstable)).where(crossings == 1), abs(stable - unstable)
         misplaced = ((answers == 1.0) & (stiffness > linear)) | (
@@ -142,7 +142,7 @@ class CycleRegionEdge(Reduction):
             "_misplaced": misplaced.sum([dimension, *along]).where(whole),
         }
         note = f"between cells with a number and without one in {self.of}, along {_STIFFNESS}"
-        if bool(failed_cell_mask(dataset["status"]).any()):
+        if bool(is_failed_or_pending(dataset["status"]).any()):
             note += "; cells along it failed or are missing"
         return self.results(note, made)
 
@@ -204,7 +204,7 @@ def spans_stiffness(softest: float, dataset: xr.Dataset) -> bool:
     return not softest or bool(ratio.min() < softest < ratio.max())
 
 
-def plot_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
+def plot_map(softest: float, dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the map of peak slip rate and the linear stability boundary.
 
     Parameters
@@ -233,7 +233,7 @@ def plot_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
     label_slip_modes(case, axes)
 
 
-def label_slip_modes(case: xr.Dataset, axes: Axes) -> None:
+def label_slip_modes(case: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the boundaries of the slip modes and their names.
 
     Parameters

@@ -14,14 +14,14 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import RigidResponse
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 from ._heat import PRESSURE_REFERENCES, PRESSURISED_FAULT, RICE
 
 _MU_STAR = 0.6
 
 
-def plot_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_closed_forms(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the undrained pore pressure in closed form.
 
     Parameters

@@ -34,10 +34,10 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.reductions import LinearFit
-from rsfstudy.slider import effective_friction
-from rsfstudy.slider.closed_forms import critical_normal_stress_step
+from rsfstudy.slider import compute_effective_friction
+from rsfstudy.slider.closed_forms import compute_critical_normal_stress_step
 from rsfstudy.study import DrawFunction
-from rsfstudy.study.figure_declarations import Axes, horizontal_line, reference_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line, reference_line
 
 from ._critical_triggers import Triggers
 from ._paper import GU_ET_AL, REFERENCE
@@ -58,7 +58,7 @@ HELD_LOAD_POINT_SOURCE = (
 )
 
 #: Effective friction mu' for alpha = 0.56 and b/a = 2.
-EFFECTIVE_FRICTION = effective_friction(base.mu_star, base.b_over_a, 0.56)
+EFFECTIVE_FRICTION = compute_effective_friction(base.mu_star, base.b_over_a, 0.56)
 FRICTION_REDUCTION = base.mu_star - EFFECTIVE_FRICTION
 
 
@@ -83,7 +83,7 @@ def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, rea
     Claim
         Claim about the critical step.
     """
-    published = critical_normal_stress_step(
+    published = compute_critical_normal_stress_step(
         base.mu_star, base.a, base.b_over_a, alpha, EXPONENTS[law], ratio
     )
     return Claim(
@@ -216,7 +216,7 @@ def draw_comparison(
         Function that draws on axes.
     """
 
-    def mark(dataset: xr.Dataset, axes: Axes) -> None:
+    def mark(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
         """Draw the curves."""
         from rsfstudy.plots import add_grey_legend_entry, cycle_style
 

@@ -19,7 +19,7 @@ from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import Status
 from rsfstudy.reductions import Boundary, Inverse
 from rsfstudy.study import DrawFunction
-from rsfstudy.study.figure_declarations import Axes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
 
 from ._bifurcation import Bifurcation
 
@@ -62,7 +62,7 @@ SPRINGS = np.round(
 )
 
 
-def plot_peaks(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_peaks(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the peak slip rates of the events and of the period-one cycle.
 
     Parameters
@@ -92,7 +92,7 @@ def plot_peaks(dataset: xr.Dataset, axes: Axes) -> None:
     axes.plot(ratio, dataset["one_event_log10_peak"], "--", **dashed)
 
 
-def plot_multipliers(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_multipliers(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the Floquet multipliers and the Lyapunov exponent.
 
     Parameters
@@ -144,7 +144,7 @@ def set_abscissa(magnified: bool) -> DrawFunction:
         Function that draws on axes.
     """
 
-    def mark(dataset: xr.Dataset, axes: Axes) -> None:
+    def mark(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
         """Set the range of the axis and draw the marks."""
         ratio = dataset["stiffness_ratio"].values
         beyond = ratio[dataset["status"].values == int(Status.SLIP_RATE_UNBOUNDED)]

@@ -17,7 +17,7 @@ import xarray as xr
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Rig, Study
 from rsfstudy.measures import LimitCycle
 from rsfstudy.reductions import InUnits, Logarithm, Mean, Quantile, StandardDeviation, StatusShares
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 # ---- result of a fit ----------------------------------------------------------------------------
 
@@ -129,7 +129,7 @@ def net_weakening(row: xr.Dataset) -> xr.DataArray:
     return row["a"] * (row["b_over_a"] - 1.0)
 
 
-def plot_quantiles(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_quantiles(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw the median and the range from the 5 % to the 95 % quantile.
 
     Parameters
@@ -143,7 +143,7 @@ def plot_quantiles(dataset: xr.Dataset, axes: Axes) -> None:
     axes.axvline(float(dataset["median"]), color="0.2", linewidth=0.9)
 
 
-def plot_histogram(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_histogram(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw a histogram of the recurrence interval.
 
     Parameters

@@ -28,7 +28,7 @@ from rsfstudy.measures import (
 )
 from rsfstudy.motion import Integrator
 from rsfstudy.reductions import Logarithm, SobolIndices
-from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 #: Means of the independent parameters, each with an uncertainty of 10 %. The stiffness is the
 #: stiffness of the limit cycles.
@@ -147,7 +147,7 @@ def first_order_claim(of: str, name: str, share: float) -> Claim:
     )
 
 
-def plot_indices(of: str, dataset: xr.Dataset, axes: Axes) -> None:
+def plot_indices(of: str, dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """Draw first-order and total indices with their confidence intervals.
 
     Parameters

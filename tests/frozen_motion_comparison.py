@@ -82,7 +82,9 @@ def record_frozen_motion(
     }
     for i in range(max((len(event.point.psis) for event in events), default=0)):
         numbers[f"psi_{i + 1}"] = [(*event.point.psis, *[math.nan] * 4)[i] for event in events]
-    loose = [i for i, e in enumerate(events) if e.kind in (EventKind.SETTLED, EventKind.REGIME)]
+    loose = [
+        i for i, e in enumerate(events) if e.kind in (EventKind.SETTLED, EventKind.REGIME_CHANGE)
+    ]
     return EventColumns(kinds, numbers, [event.evaluation_count for event in events], loose)
 
 

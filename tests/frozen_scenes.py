@@ -28,8 +28,11 @@ from rsfstudy.motion.events import (
     rise,
 )
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
-from rsfstudy.slider.equations import equations_at_imposed_slip_rate, equations_between_ruptures
+from rsfstudy.motion.recording import MOTION_VARIABLE_NAMES, Recording
+from rsfstudy.slider.equations import (
+    build_equations_at_imposed_slip_rate,
+    build_equations_between_ruptures,
+)
 
 #: Maximum number of rows per motion, and work budget of a motion.
 ROWS, BUDGET = 12, 40_000
@@ -123,9 +126,9 @@ class Track(NamedTuple):
     def events(self, scene: Scene, engine: str) -> Iterator[Any]:
         """Yield the events along the path."""
         if self.log_slip_rate is None:
-            equations = equations_between_ruptures(scene, with_time=False)
+            equations = build_equations_between_ruptures(scene, with_time=False)
         else:
-            equations = equations_at_imposed_slip_rate(scene, self.log_slip_rate)
+            equations = build_equations_at_imposed_slip_rate(scene, self.log_slip_rate)
         integrator = Integrator(Accuracy(budget=self.budget, engine=engine))
         follow = functools.partial(
             integrator.follow_equations,
@@ -146,11 +149,11 @@ class Track(NamedTuple):
         """
         recording, events = Recording(sample_times=np.array(self.samples)), []
         for event in follow(recording=recording):
-            if event.kind is EventKind.SAMPLED:
+            if event.kind is EventKind.ALL_SAMPLES_RECORDED:
                 break
             events.append(event)
         friction = (
-            recording.as_table(scene)[:, MOTION_VARIABLES.index("frictional_stress")]
+            recording.as_table(scene)[:, MOTION_VARIABLE_NAMES.index("frictional_stress")]
             - scene.mu_star
         )
         events += [

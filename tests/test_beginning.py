@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from study_runs import start_point
 
 from rsfstudy import Scene
-from rsfstudy.motion.initial_points import initial_point
+from rsfstudy.motion.initial_points import compute_initial_point
 
 DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
 
@@ -46,8 +46,8 @@ def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics)
 def test_steps_come_on_top():
     """With inertia, the slip rate does not change at the time of a step."""
     scene = Scene(initial_state=0.05, inertia=True, normal_stress="imposed", alpha=0.3)
-    begin = initial_point(scene)
-    after = initial_point(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
+    begin = compute_initial_point(scene)
+    after = compute_initial_point(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
     assert after.log_slip_rate == pytest.approx(begin.log_slip_rate, abs=1e-12)
     assert after.spring_stress == scene.stiffness * 0.5
     after = start_point(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))

@@ -182,7 +182,7 @@ def catalogued(monkeypatch):
 
     def named(*studies):
         by_name, load = {study.name: study for study in studies}, study_loader.load_study
-        replace_everywhere(monkeypatch, study_index.study_names, lambda: tuple(by_name))
+        replace_everywhere(monkeypatch, study_index.list_study_names, lambda: tuple(by_name))
         replace_everywhere(monkeypatch, load, lambda name: by_name.get(name) or load(name))
 
     return named

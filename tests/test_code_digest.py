@@ -18,13 +18,13 @@ from rsfstudy import measures
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.execution import code_digest, provenance
-from rsfstudy.execution.module_graph import ModuleGraph
+from rsfstudy.execution.module_graph import ModuleImportGraph
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.reductions import Reduction
 from rsfstudy.status import Status
 from rsfstudy.study import study_index, study_loader
-from rsfstudy.study.study_index import STUDIES_PACKAGE
+from rsfstudy.study.study_index import NAMED_STUDIES_PACKAGE
 
 HELPER = """
 import functools
@@ -168,7 +168,7 @@ def test_the_code_of_a_measure_within_another_counts(tmp_path):
     found = set()
     for number, helper in enumerate((HELPER, HELPER, HELPER.replace("2.0 * x", "3.0 * x"))):
         study = study_in(tmp_path / str(number), helper=helper, measure=text)
-        found.add(provenance.run_fingerprint(study, [study.base])["own_code"])
+        found.add(provenance.collect_run_fingerprint(study, [study.base])["own_code"])
     assert len(found - {"none"}) == 2
 
 
@@ -243,20 +243,22 @@ def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster)
 
 
 def physics_of(study):
-    return provenance.run_fingerprint(study, [study.base])["physics"]
+    return provenance.collect_run_fingerprint(study, [study.base])["physics"]
 
 
 def with_measures_of_their_own():
     """Return the modules of named studies that define their own measure."""
-    loaded = [study_loader.load_study(name) for name in study_index.study_names()]
+    loaded = [study_loader.load_study(name) for name in study_index.list_study_names()]
     homes = {study.name: type(study.measure).__module__ for study in loaded}
     return [
-        sys.modules[home] for name, home in homes.items() if home == f"{STUDIES_PACKAGE}.{name}"
+        sys.modules[home]
+        for name, home in homes.items()
+        if home == f"{NAMED_STUDIES_PACKAGE}.{name}"
     ]
 
 
 def test_a_measure_in_the_file_of_a_named_study_is_no_code_of_ones_own():
-    fingerprint = provenance.run_fingerprint(effects.study, [effects.study.base])
+    fingerprint = provenance.collect_run_fingerprint(effects.study, [effects.study.base])
     assert fingerprint["own_code"] == "none"
     assert "named_studies.effects" in fingerprint["physics"]
 
@@ -331,7 +333,7 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
         (tmp_path / name / "slider" / "law.py").write_text(text)
     assert old in LAW
     before, after = (
-        ModuleGraph(provenance.read_physics_sources(tmp_path / name)).digests()
+        ModuleImportGraph(provenance.read_physics_source_files(tmp_path / name)).compute_digests()
         for name in ("before", "after")
     )
     assert before.keys() == {"slider.law"}
@@ -340,18 +342,18 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
 
 def test_the_digest_of_the_physics_is_that_of_its_files():
     package = Path(rsfstudy.__file__).parent
-    files = provenance.read_physics_sources(package)
+    files = provenance.read_physics_source_files(package)
     assert {"slider/friction.py", "motion/motion_loop.py", "measure_base/measure.py"} <= set(files)
     moved = {**files, "slider/moved.py": files["slider/friction.py"]}
-    digests = [ModuleGraph(each).combined_digest for each in (files, moved)]
-    assert digests[0] == provenance.code_fingerprint()["physics"] != digests[1]
+    digests = [ModuleImportGraph(each).combined_digest for each in (files, moved)]
+    assert digests[0] == provenance.collect_code_fingerprint()["physics"] != digests[1]
 
 
 @pytest.mark.parametrize("name", ["triggering", "hard_cases"])
 def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     """The digest is the same before and after the use of a study."""
     study = study_loader.load_study(name)
-    fresh = code_digest.digest_measures_of_studies(study.measure.code_classes)
+    fresh = code_digest.digest_measures_of_named_studies(study.measure.code_classes)
     values = [
         value
         for kind in study.measure.code_classes
@@ -360,4 +362,4 @@ def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     values += [part for value in values if isinstance(value, dict) for part in value.values()]
     used = [value.variables for value in values if isinstance(value, measures.Measure)]
     assert used
-    assert code_digest.digest_measures_of_studies(study.measure.code_classes) == fresh
+    assert code_digest.digest_measures_of_named_studies(study.measure.code_classes) == fresh

@@ -21,8 +21,8 @@ from rsfstudy.execution.cell_plan import CellPlan
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.compiled import compile_cache, numba_backend
-from rsfstudy.motion.engines import COMPILED, ENGINES, compilation_log
-from rsfstudy.slider.equations import equations_between_ruptures
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES, compilation_log
+from rsfstudy.slider.equations import build_equations_between_ruptures
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parameter_layout import LAW
@@ -55,7 +55,9 @@ def test_hard_cases_come_out():
 
 
 def test_one_scene_calls_take_an_engine():
-    values = [float(critical_step(Scene(), engine=by)["critical_velocity_ratio"]) for by in ENGINES]
+    values = [
+        float(critical_step(Scene(), engine=by)["critical_velocity_ratio"]) for by in ENGINE_NAMES
+    ]
     assert values[1:] == pytest.approx([values[0]] * 2, rel=1e-6)
     ours = limit_cycle(Scene(**CYCLE), rtol=1e-6, engine=COMPILED)
     assert ours.attrs["status"] == "ok"
@@ -120,7 +122,7 @@ class Ending(Law):
     evolution = staticmethod(ending)
 
 
-@pytest.mark.parametrize("by", ENGINES)
+@pytest.mark.parametrize("by", ENGINE_NAMES)
 def test_a_rate_that_is_no_number_ends_the_motion(by):
     scene = Scene(law=Ending, stiffness_ratio=1.5, load_velocity_ratio=20.0)
     with pytest.warns(IncompleteWarning, match="the motion ends after"):
@@ -148,7 +150,7 @@ def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
 
     The attribute ``needs_time`` of the measure determines these equations.
     """
-    wanted, addresses = list[tuple[str, ...]](), numba_backend.compiled_function_addresses
+    wanted, addresses = list[tuple[str, ...]](), numba_backend.get_compiled_function_addresses
 
     def asked(equations):
         wanted.append((equations.regime, *equations.unknown_names))
@@ -182,13 +184,13 @@ def tripled(y, rates, p, result):
 @pytest.fixture
 def empty_cache(tmp_path, monkeypatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return compile_cache.compile_cache_folder()
+    return compile_cache.get_compile_cache_folder()
 
 
 def compiled_programs(function=doubled) -> int:
     """Return the number of programs compiled to call a function by address."""
     before = compilation_log.compiled_program_count
-    (address,) = compile_cache.compile_cfunc_addresses([function])
+    (address,) = compile_cache.compile_cfuncs_and_get_addresses([function])
     assert address
     return compilation_log.compiled_program_count - before
 
@@ -286,9 +288,9 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     function, state = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4), (0.01, 0.02)
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
-        compile_cache._jit_compile_callee_cached.cache_clear()
+        compile_cache._jit_compile_callee_once.cache_clear()
         monkeypatch.setattr(numba_backend, "_COMPILED_ADDRESS_CACHE", {})
-        equations = equations_between_ruptures(
+        equations = build_equations_between_ruptures(
             Scene(law=law, normal_stress="constant"), with_time=False
         )
         y, p = (
@@ -296,14 +298,14 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
             (ctypes.c_double * len(equations.parameters))(*equations.parameters),
         )
         result = (ctypes.c_double * 2)()
-        function(numba_backend.compiled_function_addresses(equations)[0])(y, y, p, result)
+        function(numba_backend.get_compiled_function_addresses(equations)[0])(y, y, p, result)
         assert list(result) == pytest.approx(list(equations.evaluate_rates(state)), rel=1e-12)
 
 
 def test_a_cache_of_other_code_is_never_used(monkeypatch):
     """The digest changes with any change of a function or its constants."""
     scene = Scene(law=SlipLaw)
-    rate = equations_between_ruptures(scene, with_time=False).rate_function
+    rate = build_equations_between_ruptures(scene, with_time=False).rate_function
     before = compile_cache.compute_code_digest(None, rate)
     assert compile_cache.compute_code_digest(None, rate) == before
     cells = scene.friction_functions.strength.__closure__

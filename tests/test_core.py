@@ -20,13 +20,13 @@ from rsfstudy.motion.engines import PYTHON, SCIPY
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.slider.equations import (
-    Equations,
+    EquationsOfMotion,
     build_equations_against_displacement,
-    equations_between_ruptures,
+    build_equations_between_ruptures,
 )
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.path_length import displacement_per_path_length
+from rsfstudy.slider.path_length import compute_displacement_per_path_length
 from rsfstudy.status import Status
 
 
@@ -150,15 +150,16 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
     The weight of inertia is 1e-3.
     """
     scene = Scene(load_velocity_ratio=2.0, inertia=True, **fields)
-    equations = equations_between_ruptures(scene, with_time=False)
+    equations = build_equations_between_ruptures(scene, with_time=False)
     weight = math.sqrt(1e-3 * scene.a / scene.stiffness) / scene.inertial_time
     psis = (-scene.a * math.log(weight), *[1e-3] * (scene.state_count - 1))
     state, step = np.array([2e-3, *psis]), 1e-4
     rates = np.array(equations.evaluate_rates(tuple(state)))
     ahead, behind = (
-        equations.evaluate_point(tuple(state + s * rates)).log_slip_rate for s in (step, -step)
+        equations.evaluate_motion_point(tuple(state + s * rates)).log_slip_rate
+        for s in (step, -step)
     )
-    point = equations.evaluate_point(tuple(state))
+    point = equations.evaluate_motion_point(tuple(state))
     assert abs(point.log_slip_rate_derivative) > 0.1
     # The error of the differences is proportional to the square of the step size.
     assert point.log_slip_rate_derivative == pytest.approx(
@@ -177,10 +178,10 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
 @given(st.floats(-1e12, 1e12))
 def test_the_way_along_a_path_is_that_of_its_two_parts(slant):
     """The path metric satisfies d(sigma)**2 = ds**2 + (slant ds)**2."""
-    assert displacement_per_path_length(slant) * math.hypot(1.0, slant) == pytest.approx(
+    assert compute_displacement_per_path_length(slant) * math.hypot(1.0, slant) == pytest.approx(
         1.0, rel=1e-15
     )
-    assert displacement_per_path_length(-1e300) == pytest.approx(1e-300, rel=1e-15, abs=0.0)
+    assert compute_displacement_per_path_length(-1e300) == pytest.approx(1e-300, rel=1e-15, abs=0.0)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -194,8 +195,8 @@ def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log
     scene = Scene(law=law, normal_stress="constant", load_velocity_ratio=3.0)
     state = (0.01, 0.01 - scene.a * log_slip_rate)
     by = build_equations_against_displacement(scene)
-    growth = by.evaluate_point(state).log_slip_rate_derivative
-    along = equations_between_ruptures(scene, with_time=False).evaluate_rates(state)
+    growth = by.evaluate_motion_point(state).log_slip_rate_derivative
+    along = build_equations_between_ruptures(scene, with_time=False).evaluate_rates(state)
     for ours, theirs in zip(along, by.evaluate_rates(state), strict=True):
         assert ours * math.sqrt(1.0 + (growth / 6.0) ** 2) == pytest.approx(theirs, rel=1e-12)
 
@@ -206,7 +207,7 @@ def test_inertia_is_integrated_only_where_it_acts():
     A motion that stays slow never needs the full equations.
     """
     slow = Scene(load_velocity_ratio=1.2, stiffness_ratio=1.2, inertia=True)
-    integrator = follow_until(slow, 1e-7, lambda event: event.clock > 100.0)
+    integrator = follow_until(slow, 1e-7, lambda event: event.independent_variable > 100.0)
     assert set(integrator.work_meter.evaluations_by_regime) == {"slow_manifold"}
     fast = slow.with_(stiffness_ratio=0.8)
     regimes = []
@@ -216,7 +217,9 @@ def test_inertia_is_integrated_only_where_it_acts():
         return len(regimes) > 60
 
     follow_until(fast, 1e-7, until)
-    switch = 0.5 * math.log(Accuracy(1e-7).max_inertia_weight * fast.a / fast.stiffness)
+    switch = 0.5 * math.log(
+        Accuracy(1e-7).max_inertia_weight_on_slow_manifold * fast.a / fast.stiffness
+    )
     assert all(norm <= switch + 1e-9 for regime, norm in regimes if regime == "slow_manifold")
     assert {regime for regime, _norm in regimes} == {"slow_manifold", "inertial"}
 
@@ -253,7 +256,7 @@ def test_equations_that_fail_end_in_a_status_and_not_in_nan(engine):
     def point(state, _rates, _p):
         return MotionPoint(*[float(state[0])] * len(MotionPoint._fields))._replace(psis=state)
 
-    system = Equations("broken", ("y",), (1.0,), rate, point, (1.0,) * LAW)
+    system = EquationsOfMotion("broken", ("y",), (1.0,), rate, point, (1.0,) * LAW)
     integrator = Integrator(Accuracy(budget=10**5, engine=engine))
     with np.errstate(invalid="ignore"), pytest.raises(MotionStopped) as halted:
         list(integrator.follow_equations(system, (0.0,), local_tolerance=1e-8))

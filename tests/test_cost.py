@@ -71,12 +71,12 @@ MANY = SMALL_STUDY.with_(b_over_a=np.linspace(1.5, 3.0, 1500))
 
 def test_the_compiled_engine_is_named_where_it_would_save_a_minute(tmp_path):
     assert CellPlan(MANY).estimate_evaluations_and_time()[1] > 60.0
-    advice = cost_estimates.compiled_engine_hint(CellPlan(MANY), tmp_path)
+    advice = cost_estimates.suggest_compiled_engine(CellPlan(MANY), tmp_path)
     assert advice == "--engine compiled is about 10 times faster here"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cost_estimates, "_COMPILED_SPEEDUP_BY_MEASURE", {"limit_cycle": 30})
-        assert cost_estimates.compiled_engine_hint(CellPlan(MANY), tmp_path).endswith(
+        assert cost_estimates.suggest_compiled_engine(CellPlan(MANY), tmp_path).endswith(
             "usually faster: about 30 times with limit_cycle"
         )
     (tmp_path / FILE).touch()  # The cells of this invalid journal would all be computed again.
-    assert cost_estimates.compiled_engine_hint(CellPlan(MANY), tmp_path) == ""
+    assert cost_estimates.suggest_compiled_engine(CellPlan(MANY), tmp_path) == ""

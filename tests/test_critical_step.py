@@ -18,14 +18,17 @@ from time_domain_reference import TimeDomainMotion
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.critical_steps import critical_step, motion_after_step
-from rsfstudy.critical_steps.critical_path import CriticalPath, prepare_scalar_function_for_engine
+from rsfstudy.critical_steps.critical_path import CriticalPath, compile_if_engine_is_compiled
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
+from rsfstudy.critical_steps.slow_manifold_accuracy import estimate_slow_manifold_relative_error
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.root_finding import build_root_finder
-from rsfstudy.slider.equations import equations_between_ruptures, quasi_static_log_slip_rate
+from rsfstudy.slider.equations import (
+    build_equations_between_ruptures,
+    compute_quasi_static_log_slip_rate,
+)
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.status import Status
 
@@ -282,7 +285,7 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     # second-order bound.
     assert 0.05 * weight < moved < 0.8 * weight
     left = abs(math.log(forward / path) / math.log(path))
-    assert left < slow_manifold_relative_error(scene) + 1e-8
+    assert left < estimate_slow_manifold_relative_error(scene) + 1e-8
 
 
 def test_mass_counts_at_a_norm_just_above_the_loading_rate():
@@ -325,7 +328,7 @@ def test_a_displacement_step_may_jump_to_the_norm_at_once():
     """
     scene = Scene(law="slowness", stiffness_ratio=5.0, instability_norm=0.01)
     value, _error, outcome = found(scene, DISPLACEMENT)
-    jump = quasi_static_log_slip_rate(scene, scene.stiffness * value, 0.0)
+    jump = compute_quasi_static_log_slip_rate(scene, scene.stiffness * value, 0.0)
     assert jump == pytest.approx(scene.log_instability_rate, rel=1e-8)
     assert "jump" in outcome.message
     with_mass = found(scene.with_(inertia=True), DISPLACEMENT)[0]
@@ -355,7 +358,9 @@ def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
     """
     slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
     scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
-    assert motion_after_step.motion_reaches_norm(scene, Integrator(Accuracy(1e-6, 15_000)))
+    assert motion_after_step.motion_reaches_instability_norm(
+        scene, Integrator(Accuracy(1e-6, 15_000))
+    )
 
 
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
@@ -365,7 +370,7 @@ def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
     """
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
     for inertia in (False, True):
-        reached = motion_after_step.motion_reaches_norm(
+        reached = motion_after_step.motion_reaches_instability_norm(
             scene.with_(inertia=inertia), Integrator(Accuracy(1e-6, 500_000))
         )
         assert reached is not inertia
@@ -380,9 +385,13 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
         assert peak < scene.log_instability_rate
-        assert not motion_after_step.motion_reaches_norm(scene, Integrator(Accuracy(1e-6, 500_000)))
+        assert not motion_after_step.motion_reaches_instability_norm(
+            scene, Integrator(Accuracy(1e-6, 500_000))
+        )
     low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
-    assert motion_after_step.motion_reaches_norm(low, Integrator(Accuracy(1e-6, 500_000)))
+    assert motion_after_step.motion_reaches_instability_norm(
+        low, Integrator(Accuracy(1e-6, 500_000))
+    )
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():
@@ -418,8 +427,8 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
         scene, Integrator(Accuracy())
     ).tangency_point_at_instability_norm
     assert start is not None
-    system = equations_between_ruptures(scene, with_time=False)
-    point = system.evaluate_point(start)
+    system = build_equations_between_ruptures(scene, with_time=False)
+    point = system.evaluate_motion_point(start)
     assert point.log_slip_rate == pytest.approx(scene.log_instability_rate, rel=1e-12)
     assert point.log_slip_rate_derivative == pytest.approx(0.0, abs=1e-11)
 
@@ -440,9 +449,9 @@ def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_str
         ]
         plain, compiled = (path.tangency_point_at_instability_norm for path in paths)
         assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
-        begin = (0.01, -0.02), paths[0].parameters
+        begin = (0.01, -0.02), paths[0].scene_parameter_values
         at = [
-            prepare_scalar_function_for_engine(
+            compile_if_engine_is_compiled(
                 path.motion_point_evaluator, path.integrator.engine, *begin
             )(*begin)
             for path in paths

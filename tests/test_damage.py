@@ -41,7 +41,7 @@ def test_a_file_without_its_end_opens_with_a_warning(written, tmp_path):
     with pytest.warns(UserWarning, match="has no digest, because another program saved"):
         opened = rsfstudy.open(tmp_path / "tiny.nc")
     xr.testing.assert_identical(opened, rsfstudy.open(written))
-    assert content_digest.DIGEST_ATTRIBUTE not in opened.attrs
+    assert content_digest.CONTENT_DIGEST_ATTRIBUTE not in opened.attrs
 
 
 @pytest.mark.parametrize("damaged", ["declaration", "number", "text", "content_digest"])

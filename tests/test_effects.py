@@ -15,11 +15,11 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import (
     build_equations_against_displacement,
     build_equations_against_inertial_time,
-    equations_at_imposed_slip_rate,
-    equations_between_ruptures,
-    equations_in_rupture,
-    equations_without_mass,
-    quasi_static_log_slip_rate,
+    build_equations_at_imposed_slip_rate,
+    build_equations_between_ruptures,
+    build_equations_in_rupture,
+    build_equations_without_mass,
+    compute_quasi_static_log_slip_rate,
 )
 from rsfstudy.slider.friction import build_friction_relation
 
@@ -70,7 +70,7 @@ def eq_13(scene: Scene, displacement: float) -> float:
 @given(st.floats(-3.0, 5.0), st.floats(0.0, 1.0), st.floats(45.0, 85.0))
 def test_jump_of_slip_rate_is_eq_13(displacement, alpha, phi):
     scene = Scene(alpha=alpha, phi=phi, displacement_step=displacement)
-    ours = math.exp(quasi_static_log_slip_rate(scene, scene.spring_stress_step, 0.0))
+    ours = math.exp(compute_quasi_static_log_slip_rate(scene, scene.spring_stress_step, 0.0))
     assert ours == pytest.approx(eq_13(scene, displacement), rel=1e-12)
 
 
@@ -95,15 +95,15 @@ def test_phi_to_90_degrees_is_constant_normal_stress(g):
 @pytest.mark.parametrize(
     ("equations", "unknowns"),
     [
-        (equations_at_imposed_slip_rate(Scene(normal_stress="constant"), 1.0), 1),
-        (equations_at_imposed_slip_rate(Scene(), 1.0), 1),
-        (equations_between_ruptures(Scene(normal_stress="constant"), with_time=False), 2),
-        (equations_between_ruptures(Scene(alpha=0.0), with_time=False), 2),
-        (equations_between_ruptures(Scene(), with_time=False), 2),
-        (equations_between_ruptures(Scene(), with_time=True), 3),
-        (equations_between_ruptures(Scene(radiation_damping=0.1), with_time=False), 2),
-        (equations_between_ruptures(Scene(inertia=True), with_time=False), 2),
-        (equations_in_rupture(Scene(inertia=True)), 3),
+        (build_equations_at_imposed_slip_rate(Scene(normal_stress="constant"), 1.0), 1),
+        (build_equations_at_imposed_slip_rate(Scene(), 1.0), 1),
+        (build_equations_between_ruptures(Scene(normal_stress="constant"), with_time=False), 2),
+        (build_equations_between_ruptures(Scene(alpha=0.0), with_time=False), 2),
+        (build_equations_between_ruptures(Scene(), with_time=False), 2),
+        (build_equations_between_ruptures(Scene(), with_time=True), 3),
+        (build_equations_between_ruptures(Scene(radiation_damping=0.1), with_time=False), 2),
+        (build_equations_between_ruptures(Scene(inertia=True), with_time=False), 2),
+        (build_equations_in_rupture(Scene(inertia=True)), 3),
     ],
 )
 def test_number_of_unknowns(equations, unknowns):
@@ -117,11 +117,13 @@ def test_the_same_functions_serve_all_scenes_of_the_same_parts():
     All parameters are arguments.
     """
     one, other = (
-        equations_between_ruptures(Scene(a=a, phi=phi, load_velocity_ratio=load), with_time=False)
+        build_equations_between_ruptures(
+            Scene(a=a, phi=phi, load_velocity_ratio=load), with_time=False
+        )
         for a, phi, load in ((0.01, 55.0, 2.0), (0.02, 70.0, 3.0))
     )
     assert one.rate_function is other.rate_function
-    assert one.point_function is other.point_function
+    assert one.motion_point_function is other.motion_point_function
     assert one.parameters != other.parameters
     assert all(isinstance(number, float) for number in one.parameters)
     cells = (cell.cell_contents for cell in one.rate_function.__closure__ or ())
@@ -143,17 +145,17 @@ def test_scenes_of_the_same_parts_share_all_functions(parts):
     one, other = (Scene(**parts, a=a, stiffness=0.01) for a in (0.01, 0.012))
     assert one.friction_functions == other.friction_functions
     builders = [
-        lambda scene: equations_between_ruptures(scene, with_time=True),
-        lambda scene: equations_without_mass(scene, with_time=False),
+        lambda scene: build_equations_between_ruptures(scene, with_time=True),
+        lambda scene: build_equations_without_mass(scene, with_time=False),
         lambda scene: build_equations_against_displacement(scene),
-        lambda scene: equations_at_imposed_slip_rate(scene, 0.5),
+        lambda scene: build_equations_at_imposed_slip_rate(scene, 0.5),
     ]
     if one.has_mass:
-        builders += [equations_in_rupture, build_equations_against_inertial_time]
+        builders += [build_equations_in_rupture, build_equations_against_inertial_time]
     for build in builders:
         first, second = build(one), build(other)
         assert first.rate_function is second.rate_function
-        assert first.point_function is second.point_function
+        assert first.motion_point_function is second.motion_point_function
         assert first.force_balance_function is second.force_balance_function
 
 
@@ -165,13 +167,15 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
         massive = scene.with_(inertia=True)
         for wild, psi in itertools.product((-1e6, -2.0, -1.7320508, 3.0, 1e6), (-50.0, 0.0, 50.0)):
             pores = [wild, psi][: scene.state_count - 1]
-            for system in (equations_between_ruptures(s, with_time=True) for s in (scene, massive)):
+            for system in (
+                build_equations_between_ruptures(s, with_time=True) for s in (scene, massive)
+            ):
                 assert all(map(math.isfinite, system.evaluate_rates([wild, psi, *pores, 0.0])))
             for x in (-1e4, 0.0, 1e4):
                 assert all(
                     map(
                         math.isfinite,
-                        equations_in_rupture(massive).evaluate_rates([wild, x, wild, *pores]),
+                        build_equations_in_rupture(massive).evaluate_rates([wild, x, wild, *pores]),
                     )
                 )
 

@@ -10,7 +10,7 @@ from study_runs import start_point
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.errors import IncompleteWarning, NoResultWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
@@ -96,7 +96,7 @@ def test_the_norm_is_met_before_normal_stress_is_lost(engine):
         stepped = scene.with_(normal_stress_step=step)
         for rtol in (1e-6, 1e-8):
             asked = Integrator(Accuracy(rtol, 100_000, engine=engine))
-            assert motion_reaches_norm(stepped, asked) is reached, (step, rtol)
+            assert motion_reaches_instability_norm(stepped, asked) is reached, (step, rtol)
 
 
 @pytest.mark.parametrize("rise_by", [0.5, 5.0, 11.0, 30.0, 60.0])

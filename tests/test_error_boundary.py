@@ -133,7 +133,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: RIG.in_units("x"), "'dataset' must be an xarray.Dataset"),
         (lambda r: Scene().with_segment(None), "segment must be a rsfstudy.Segment"),
         (
-            lambda r: rsfstudy.protocol([{"velocity": 2.0}]).locate_load_point_reversal(9),
+            lambda r: rsfstudy.protocol([{"velocity": 2.0}]).describe_load_point_reversal(9),
             "index = 9 is out of",
         ),
         (lambda r: Figure(panels=int), "'panels' must be a list"),
@@ -188,7 +188,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
             "column must be a heading.*got <DataArray",
         ),
         (
-            lambda r: reductions.Mean("z", of="x").compute(ARRAY),
+            lambda r: reductions.Mean("z", of="x").compute_value_and_stderr(ARRAY),
             "'of' has no dimension 'sample' .got <DataArray>.. Ch",
         ),
         (lambda r: PowerLaw("z", of="x", on="y").centre_values(ARRAY, "y"), "has no dimension 'y'"),
@@ -285,7 +285,7 @@ ESCAPE = "\x1b]0;x\x07\x1b[31m"
 
 
 def test_headings_of_html_are_spelt_out():
-    shown = HtmlMarkup.table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
+    shown = HtmlMarkup.format_table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
     assert shown.isprintable()
     assert shown.count("x1b[31m") == 3
 
@@ -295,12 +295,12 @@ def test_warnings_are_spelt_out():
 
 
 def test_headings_of_the_terminal_are_spelt_out(dataset, tmp_path, capsys):
-    from rsfstudy.cli.table_layout import print_summary_piece
+    from rsfstudy.cli.table_layout import print_table_or_sentence
     from rsfstudy.reporting.tables import TextTable
 
     rows = [{f"zeta ({ESCAPE})": "1", "why": "x" * 60}]
-    print_summary_piece(TextTable(rows, caption=ESCAPE, wrappable_columns={"why"}))
-    print_summary_piece({ESCAPE: "1"})
+    print_table_or_sentence(TextTable(rows, caption=ESCAPE, wrappable_columns={"why"}))
+    print_table_or_sentence({ESCAPE: "1"})
     wide = {f"{n} {ESCAPE}": "y" * 30 for n in range(5)}
-    print_summary_piece(TextTable([wide]))  # This table is too wide and is printed as a list.
+    print_table_or_sentence(TextTable([wide]))  # This table is too wide and is printed as a list.
     assert all(c.isprintable() or c == "\n" for c in capsys.readouterr().out)

@@ -52,8 +52,8 @@ def test_autocorrelated_whitened_residuals_change_the_status() -> None:
 
 
 def test_tables_mark_standard_errors_that_are_not_valid() -> None:
-    assert not fit_tables.all_fits_are_valid(naive())  # The exit status is 1.
-    assert fit_summaries.format_with_stderr(naive().squeeze(), "a").endswith("*")
+    assert not fit_tables.are_all_fits_valid(naive())  # The exit status is 1.
+    assert fit_summaries.format_parameter_with_stderr(naive().squeeze(), "a").endswith("*")
     texts = [
         piece
         for piece in summaries.build_summary_tables_and_sentences(naive())

@@ -23,10 +23,10 @@ from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import laws, stability, steady_state
 from rsfstudy.slider.equations import (
-    Equations,
+    EquationsOfMotion,
     build_equations_against_displacement,
     build_equations_against_inertial_time,
-    equations_between_ruptures,
+    build_equations_between_ruptures,
 )
 from rsfstudy.status import Status
 
@@ -56,13 +56,15 @@ HEAT_EFFECTS = [
 #: All laws and normal stresses, with each effect that is compatible with both.
 SCENES = [
     {"law": law, **stress, **effect}
-    for law, stress, effect in itertools.product(sorted(laws.BUILT_IN_PARTS), STRESSES, EFFECTS)
+    for law, stress, effect in itertools.product(
+        sorted(laws.BUILT_IN_LAW_CLASS_BY_NAME), STRESSES, EFFECTS
+    )
     if not ("stress_dependence" in effect and stress.get("normal_stress") == "imposed")
 ]
 SCENES += [
     {"law": law, **stress, **effect}
     for law, stress, effect in itertools.product(
-        sorted(laws.BUILT_IN_PARTS), STRESSES[::2], HEAT_EFFECTS
+        sorted(laws.BUILT_IN_LAW_CLASS_BY_NAME), STRESSES[::2], HEAT_EFFECTS
     )
     if not (law.startswith("two_") and "direct_activation" in effect)
 ]
@@ -88,10 +90,10 @@ def scene_of(fields: dict, ratio: float, log_slip_rate: float = 0.0) -> Scene:
     The critical stiffness is evaluated at the velocity of the load point.
     """
     scene = Scene(**{"load_velocity_ratio": math.exp(log_slip_rate), "stiffness": 0.01, **fields})
-    return scene.with_(stiffness=ratio * stability.critical_stiffness(scene, log_slip_rate))
+    return scene.with_(stiffness=ratio * stability.compute_critical_stiffness(scene, log_slip_rate))
 
 
-def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
+def eigenvalues(equations: EquationsOfMotion, state: tuple[float, ...]) -> np.ndarray:
     """Return the eigenvalues of the assembled equations at a steady state.
 
     The Jacobian consists of central differences.
@@ -113,14 +115,14 @@ def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, 
     displacement, which grows twice as fast as slip.
     """
     scene = scene_of(fields, ratio, log_slip_rate)
-    found = steady_state.steady_sliding(scene, log_slip_rate)
+    found = steady_state.compute_steady_sliding(scene, log_slip_rate)
     equations, at = (
         build_equations_against_displacement(scene),
         (found.spring_stress, *found.states),
     )
     assert np.abs(equations.evaluate_rates(at)).max() < 1e-13
     ours, theirs = (
-        0.5 * stability.linear_growth_rates(scene, log_slip_rate),
+        0.5 * stability.compute_linear_growth_rates(scene, log_slip_rate),
         eigenvalues(equations, at),
     )
     assert len(ours) == 1 + scene.state_count
@@ -134,9 +136,9 @@ def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, 
 def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
     """Growth rates times the inertial time equal the eigenvalues."""
     scene = Scene(**{"stiffness_ratio": 0.9, **fields})
-    found = steady_state.steady_sliding(scene, 0.0)
+    found = steady_state.compute_steady_sliding(scene, 0.0)
     at = (found.spring_stress, 0.0, found.frictional_stress, *found.states[1:])
-    ours = scene.inertial_time * stability.linear_growth_rates(scene, 0.0)
+    ours = scene.inertial_time * stability.compute_linear_growth_rates(scene, 0.0)
     theirs = eigenvalues(build_equations_against_inertial_time(scene), at)
     np.testing.assert_allclose(np.sort_complex(ours), theirs, rtol=1e-6)
 
@@ -149,13 +151,13 @@ def test_critical_stiffness_is_where_growth_begins(fields):
     makes them small.
     """
     for off, grows in ((-1e-6, True), (1e-6, False)):
-        rates = stability.linear_growth_rates(scene_of(fields, 1.0 + off, 0.7), 0.7)
+        rates = stability.compute_linear_growth_rates(scene_of(fields, 1.0 + off, 0.7), 0.7)
         assert bool(rates[0].real > 0.0) is grows
         assert abs(rates[0].real) < 1e-5
 
 
 @given(
-    law=st.sampled_from(sorted(laws.BUILT_IN_PARTS)),
+    law=st.sampled_from(sorted(laws.BUILT_IN_LAW_CLASS_BY_NAME)),
     alpha=st.none() | st.floats(0.0, 1.0),
     phi=st.floats(50.0, 85.0),
     log_slip_rate=st.floats(-3.0, 3.0),
@@ -198,7 +200,9 @@ def test_the_measure_finds_the_threshold_of_growth(
         # The effect of damping is the difference of two numbers of the size of the undamped
         # stiffness. Close to the limit beyond which no stiffness is stable, the threshold is
         # ill-conditioned.
-        undamped = stability.critical_stiffness(Scene(**fields), log_slip_rate, quasi_static=True)
+        undamped = stability.compute_critical_stiffness(
+            Scene(**fields), log_slip_rate, quasi_static=True
+        )
         # With inertia, growth per inertial time is proportional to the square of the slip rate
         # norm, and the Jacobian from differences has an error of a few 1e-12.
         within = 1e-6 if log_norm is None else max(1e-6, 2e-11 * 100.0 ** -max(log_norm, -3.0))
@@ -215,15 +219,15 @@ def test_slip_rate_grows_as_the_unknowns_change(fields):
     The test state is away from steady sliding.
     """
     scene = Scene(**{"load_velocity_ratio": 3.0, "stiffness": 0.01, **fields})
-    equations = equations_between_ruptures(scene, with_time=False)
+    equations = build_equations_between_ruptures(scene, with_time=False)
     at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02, 0.01][: 1 + scene.state_count])
     rates, step = np.array(equations.evaluate_rates(tuple(at))), 1e-5
     ahead, behind = (
-        equations.evaluate_point(tuple(at + s * rates)).log_slip_rate for s in (step, -step)
+        equations.evaluate_motion_point(tuple(at + s * rates)).log_slip_rate for s in (step, -step)
     )
     # The error of the differences is proportional to the square of the step size, plus the
     # rounding error divided by the step size.
-    told = equations.evaluate_point(tuple(at)).log_slip_rate_derivative
+    told = equations.evaluate_motion_point(tuple(at)).log_slip_rate_derivative
     assert told == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6, abs=1e-9)
 
 
@@ -263,7 +267,7 @@ def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
     # errors.
     small = 1e-4 if "period" in fields else 1e-5
     scene = Scene(stiffness_ratio=ratio, load_velocity_ratio=1.0, displacement_step=small, **fields)
-    rates = stability.linear_growth_rates(scene, 0.0)
+    rates = stability.compute_linear_growth_rates(scene, 0.0)
     turning = max((rate for rate in rates if rate.imag), key=lambda rate: rate.real)
     peaks = []
     for event in Integrator(Accuracy(1e-9, 10**6)).follow(

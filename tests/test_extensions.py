@@ -39,7 +39,9 @@ from rsfstudy.study.figure_declarations import Figure, Panel
 
 #: Fields of every scene. Other fields are part of a scene only if they have a value.
 PLAIN = tuple(
-    name for name in part_registry.SCENE_FIELD_NAMES if name not in part_registry.OMITTED_DEFAULTS
+    name
+    for name in part_registry.SCENE_FIELD_NAMES
+    if name not in part_registry.DEFAULTS_OMITTED_FROM_STORED_SCENES
 )
 EXAMPLES = sorted((Path(__file__).parent / "extensions").glob("*.py"))
 #: One cell of each study.
@@ -265,7 +267,7 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
 
 
 def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, monkeypatch):
-    for slot in part_registry.SLOTS:
+    for slot in part_registry.PART_SLOTS:
         monkeypatch.setitem(vars(slot), "user_parts", {})
     dataset = rsfstudy.open(outside["saturating_law"].file)
     assert dataset.attrs["id"] == "saturating_laws"

@@ -27,7 +27,7 @@ from study_runs import (
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli import assignment_parsing
-from rsfstudy.cli.study_results import StudyResults, print_failures
+from rsfstudy.cli.study_results import StudyResults, print_failed_cells
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RunError
 from rsfstudy.execution import clusters, study_run, worker_pool
@@ -98,8 +98,8 @@ def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
         cells = dataset.sel(fault=fault)
         only_one_failed(cells, status)
         assert message in cells.message.values[1]
-        assert not StudyResults(cells, "").is_complete
-        print_failures(StudyResults(cells, ""), with_commands=False)
+        assert not StudyResults(cells, "").is_complete_without_failures
+        print_failed_cells(StudyResults(cells, ""), with_rerun_commands=False)
         assert status in capsys.readouterr().out
 
 

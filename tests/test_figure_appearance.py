@@ -195,7 +195,7 @@ def test_the_labels_of_correlations_do_not_collide(steps):
     with plots.style_context():
         drawn = plots.NotebookFigure(figsize=(3.4, 2.4), layout="constrained")
         axes = drawn.add_subplot()
-        fits._draw_correlation(fit_of_steps(steps), axes)
+        fits._draw_parameter_correlation_matrix(fit_of_steps(steps), axes)
         drawn.draw_without_rendering()
         labels = [*axes.get_xticklabels()], [*axes.get_yticklabels()], list(axes.texts)
     for group in labels:
@@ -231,14 +231,14 @@ def test_samples_are_a_corner_plot():
         same_column = [other for other, at in zip(drawn.axes, rows, strict=True) if at[1] == column]
         assert {other.get_xlim() for other in same_column} == {axes.get_xlim()}
     checks.assert_printable(drawn)
-    assert isinstance(samples.corner_figure(dataset), samples.CornerFigure)
+    assert isinstance(samples.build_corner_figure(dataset), samples.CornerFigure)
 
 
 def test_a_field_of_a_corner_plot_is_drawn_once_with_its_symbol():
     normal = np.random.default_rng(1).normal
     table = {"a": 0.01 + 1e-3 * normal(size=40), "b_over_a": 2.0 + 0.1 * normal(size=40)}
     dataset = lattice(Axis.cases(table, dimension="sample"))
-    assert samples.corner_figure(dataset, "a").columns == 2
+    assert samples.build_corner_figure(dataset, "a").columns == 2
     lengths = xr.Dataset(
         {"slip_distance": ((), 12.0, {"long_name": "characteristic slip distance", "units": "um"})}
     )
@@ -266,8 +266,8 @@ def test_the_figure_of_overlapping_windows():
     curves = [line for line in axes.lines if line.get_label() == "slip law"]
     assert curves[1].get_xdata().min() > curves[0].get_xdata().max()
     assert "overlap of windows" in axes.get_legend_handles_labels()[1]
-    assert fits._step_title(dataset) == "Step 1 (of 2)"
-    assert fits._correlation_title(dataset) == "Correlation, step 1: slip law"
+    assert fits._format_loading_step_title(dataset) == "Step 1 (of 2)"
+    assert fits._format_correlation_title(dataset) == "Correlation, step 1: slip law"
     fits._draw_record_with_fits(dataset, record := plots.NotebookFigure().add_subplot())
     low, high = record.get_xlim()
     assert -10.0 < low < 0.0 < 199.0 < high < 210.0
@@ -285,7 +285,7 @@ def test_posterior_draws_are_a_corner_plot():
         {"parameter": ["a", "slip_distance"], "draw": np.arange(30)},
     )
     figure, drawn = samples.posterior_figure(dataset)
-    assert figure.places == [0, 2, 3]
+    assert figure.subplot_positions == [0, 2, 3]
     assert figure.panels[1].y_label == r"$D_c$ ($\mu$m)"
     assert np.array_equal(drawn.slip_distance, dataset.posterior[:, 1])
 

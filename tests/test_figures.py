@@ -35,7 +35,7 @@ MM = 25.4
 SLACK = 0.015
 
 
-@pytest.fixture(scope="module", params=study_index.study_names())
+@pytest.fixture(scope="module", params=study_index.list_study_names())
 def figure(request, tmp_path_factory):
     """Draw the figure of each reduced named study."""
     dataset, _path = named_results(request.param, tmp_path_factory)
@@ -372,7 +372,10 @@ def test_a_font_that_is_missing_is_named_once(tmp_path, monkeypatch):
 def test_style_sheets_are_read_as_matplotlib_reads_them():
     import matplotlib
 
-    sheets = [*Path(matplotlib.get_data_path(), "stylelib").glob("*.mplstyle"), _style.STYLE_SHEET]
+    sheets = [
+        *Path(matplotlib.get_data_path(), "stylelib").glob("*.mplstyle"),
+        _style.DEFAULT_STYLE_SHEET_PATH,
+    ]
     for sheet in sheets:
         theirs = matplotlib.rc_params_from_file(sheet, use_default_template=False)
         with plots.style_context([{"font.size": 5.0}, sheet]):
@@ -442,7 +445,7 @@ def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_pat
     ],
 )
 def test_words(text, written):
-    assert _text.to_mathtext(text) == written
+    assert _text.convert_symbols_to_mathtext(text) == written
 
 
 @pytest.mark.parametrize(("count", "columns"), [(5, 4), (7, 3), (4, 2), (3, 5)])

@@ -24,7 +24,7 @@ from rsfstudy.execution.provenance import read_git_commit_and_state
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 from rsfstudy.storage import dataset_files, declarations, rebuild_from_file, schema
-from rsfstudy.storage.cell_columns import OutputPacker
+from rsfstudy.storage.cell_columns import CellOutputPacker
 from rsfstudy.storage.cell_journal import CellJournal
 from rsfstudy.study import study_index, study_loader
 
@@ -116,7 +116,7 @@ class Pair(Measure):
     inner_coordinates = {"phase": np.arange(2.0)}  # noqa: RUF012
 
 
-LAYOUT = OutputPacker(Pair())
+LAYOUT = CellOutputPacker(Pair())
 DONE = (Outcome(Status.OK, {"v": 1.5, "profile": np.array([1.0, np.nan])}, "", 42), 0.1)
 KEYS = np.array([cell_key(Scene(b_over_a=b), Pair()) for b in (2.0, 3.0)], dtype="V16")
 
@@ -129,9 +129,9 @@ def journal(tmp_path, fingerprint=None, **options):
 
 def test_the_journal_returns_what_it_was_given(tmp_path):
     with journal(tmp_path) as kept:
-        kept.add_cells([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
+        kept.add_cells([LAYOUT.pack_journal_row(KEYS[0].tobytes(), *DONE)])
     with journal(tmp_path) as kept:
-        assert kept.statuses(KEYS).tolist() == [Status.OK, Status.PENDING]
+        assert kept.read_statuses(KEYS).tolist() == [Status.OK, Status.PENDING]
         found = kept.read_cells(KEYS)
     assert found.statuses.tolist() == [Status.OK, Status.PENDING]
     assert (found.rhs_evaluations[0], found.wall_times[0]) == (42, 0.1)
@@ -148,7 +148,7 @@ def test_a_damaged_journal_is_named(tmp_path):
 
 def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
     with journal(tmp_path) as kept:
-        kept.add_cells([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
+        kept.add_cells([LAYOUT.pack_journal_row(KEYS[0].tobytes(), *DONE)])
     path = tmp_path / "trial.cells.sqlite"
     right, wrong = np.array([1.5]).tobytes(), np.array([1.25]).tobytes()
     content = path.read_bytes()
@@ -161,7 +161,7 @@ def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
 def test_a_result_moved_to_another_cell_of_the_journal_is_noticed(tmp_path):
     """A valid result under the key of another cell is detected."""
     with journal(tmp_path) as kept:
-        kept.add_cells([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
+        kept.add_cells([LAYOUT.pack_journal_row(KEYS[0].tobytes(), *DONE)])
     with contextlib.closing(sqlite3.connect(tmp_path / "trial.cells.sqlite")) as db, db:
         db.execute("UPDATE cells SET key = ?", (KEYS[1].tobytes(),))
     with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
@@ -259,12 +259,12 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
 
 
 # ---- from the file alone ------------------------------------------------------------------------
-@pytest.mark.parametrize("name", study_index.study_names())
+@pytest.mark.parametrize("name", study_index.list_study_names())
 def test_every_declaration_restores_its_study(name):
     study = study_loader.load_study(name)
     described = json.loads(json.dumps(study.describe()))
-    restored = rebuild_from_file.study_from_declaration(
-        declarations.parse_declaration(described), study.user_parts
+    restored = rebuild_from_file.build_study_from_declaration(
+        declarations.parse_study_declaration(described), study.user_parts
     )
     assert json.loads(json.dumps(restored.describe())) == described
     assert restored.size == study.size

@@ -11,7 +11,10 @@ from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS
 
 import rsfstudy
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaged_noise_correlation import AveragedNoiseCorrelation, apply_running_mean
+from rsfstudy.fitting.averaged_noise_correlation import (
+    NoiseCorrelationFromAveraging,
+    apply_running_mean,
+)
 from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, Filter
 from rsfstudy.status import Status
 
@@ -67,10 +70,10 @@ def test_the_correlation_of_averages_is_removed() -> None:
     time = 0.2 * np.arange(60.0)
     lags = np.abs(time[:, None] - time)
     exact = np.maximum(1.0 - lags, 0.0) + 0.002 * np.eye(60)
-    overlap = AveragedNoiseCorrelation(time, 1.0)
+    overlap = NoiseCorrelationFromAveraging(time, 1.0)
     root = np.linalg.inv(np.linalg.cholesky(exact))
     np.testing.assert_allclose(overlap.whiten_columns(np.eye(60)), root, atol=1e-9)
-    assert overlap.log_determinant == pytest.approx(np.linalg.slogdet(exact)[1])
+    assert overlap.correlation_log_determinant == pytest.approx(np.linalg.slogdet(exact)[1])
     # The ratio is smaller at the ends.
     assert overlap.row_count_per_independent_sample == pytest.approx(5.0, rel=0.1)
     line = apply_running_mean(time, time[:, None] ** 2, 1.0)[:, 0]

@@ -22,8 +22,8 @@ from synthetic_records import (
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.fitting.load_point_noise import shift_steps_by_their_errors
-from rsfstudy.fitting.recorded_loading import loading_history
+from rsfstudy.fitting.load_point_noise import copy_steps_shifted_by_their_errors
+from rsfstudy.fitting.recorded_loading import build_loading_history
 from rsfstudy.fitting.window_model import LOADING_STEP_SHIFT_OVER_STANDARD_ERROR, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.integrator import Integrator
@@ -69,9 +69,9 @@ def test_a_spring_softer_than_critical_is_not_followed(law: str) -> None:
     model = WindowModel(scene, times, times, times, loading, integrator)
     critical = (EXACT_PARAMETERS["b"] - EXACT_PARAMETERS["a"]) / EXACT_PARAMETERS["slip_distance"]
     soft, stiff = (EXACT_PARAMETERS | {"stiffness": part * critical} for part in (0.999, 3.0))
-    assert np.isnan(model.model_friction(soft, require_stable=True)).all()
+    assert np.isnan(model.compute_model_friction(soft, require_stable=True)).all()
     assert integrator.evaluations == 0
-    assert np.isfinite(model.model_friction(stiff, require_stable=True)).all()
+    assert np.isfinite(model.compute_model_friction(stiff, require_stable=True)).all()
     assert integrator.evaluations > 0
 
 
@@ -85,7 +85,7 @@ def test_a_ramp_is_loaded_at_steady_acceleration() -> None:
     columns = {"time": times, "displacement": synthetic.load_point_displacement(RAMP, times)}
     columns["friction"] = synthetic.friction_and_sensitivities("slowness", times, RAMP)[0]
     one = rsfstudy.read_record(columns).with_steps([(40.0, 40.4, 1.0, 10.0)])
-    pieces = loading_history(one, 0.0, 50.0, use_recorded_rows=False)
+    pieces = build_loading_history(one, 0.0, 50.0, use_recorded_rows=False)
     ends = np.append(pieces[1:, 0], 50.0)
     moved = np.cumsum(pieces[:, 1] * (ends - pieces[:, 0]))
     lasts = np.clip(ends - 40.0, 0.0, 0.4)
@@ -142,7 +142,7 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
     times = np.array(
         [
             [step[:4] for step in steps]
-            for steps in shift_steps_by_their_errors(one, one.loading_steps)
+            for steps in copy_steps_shifted_by_their_errors(one, one.loading_steps)
         ]
     )
     variances = np.square(times - np.array([one.loading_steps[0][:4]])).sum(axis=(0, 1))
@@ -154,8 +154,8 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
     exact = [of_time, *(12 * 0.01 / (counts * lasts**2))]
     # 400 rows determine s^2 to 7 %, and a random noise order above 0 adds to this error.
     assert variances == pytest.approx(exact, rel=0.25)
-    assert shift_steps_by_their_errors(one.with_steps([step[:4]]), [step]) == []
-    assert shift_steps_by_their_errors(synthetic_record(), [step]) == []
+    assert copy_steps_shifted_by_their_errors(one.with_steps([step[:4]]), [step]) == []
+    assert copy_steps_shifted_by_their_errors(synthetic_record(), [step]) == []
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])

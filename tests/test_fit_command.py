@@ -14,7 +14,7 @@ from study_runs import call_main
 
 import rsfstudy
 from rsfstudy.reporting import fit_tables
-from rsfstudy.reporting.fit_summaries import format_with_stderr
+from rsfstudy.reporting.fit_summaries import format_parameter_with_stderr
 from rsfstudy.status import Status
 
 #: True parameters of the records below, for the slowness law and 1 -> 10 -> 1 um/s.
@@ -177,7 +177,7 @@ def test_a_stiffness_of_stress_is_taken_over_normal_stress(written):
 
 def test_a_number_has_the_digits_that_its_error_gives_it():
     def told(value, error, status=0):
-        return format_with_stderr(
+        return format_parameter_with_stderr(
             xr.Dataset({"x": value, "x_stderr": error, "status": status}), "x"
         )
 

@@ -14,7 +14,11 @@ from scipy.optimize import minimize_scalar
 
 from rsfstudy.fitting import confidence_intervals
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
-from rsfstudy.fitting.window_model import QUICK_DIFFERENCE_SCHEME, DifferenceScheme, ParameterValues
+from rsfstudy.fitting.window_model import (
+    QUICK_DIFFERENCE_SCHEME,
+    FiniteDifferenceScheme,
+    ParameterValues,
+)
 
 ROWS, SIZE = 80, 1e-3
 FREE = ("b", "slip_distance", "mu_star")
@@ -66,7 +70,7 @@ class Relaxation:
         self,
         values: ParameterValues,
         free: Sequence[str],
-        difference_scheme: DifferenceScheme = QUICK_DIFFERENCE_SCHEME,
+        difference_scheme: FiniteDifferenceScheme = QUICK_DIFFERENCE_SCHEME,
     ) -> np.ndarray:
         """Return the derivatives in closed form."""
         over = self.displacement / values["slip_distance"]
@@ -103,9 +107,11 @@ def by_hand(model: Relaxation, b: float) -> float:
 
 def test_intervals_end_where_the_likelihood_has_fallen() -> None:
     model, search, found = fit(25.0)
-    far = confidence_intervals.student_t_multiplier(found, confidence_intervals.CONFIDENCE_LEVEL)
+    far = confidence_intervals.compute_student_t_quantile(
+        found, confidence_intervals.CONFIDENCE_LEVEL
+    )
     b = found.parameter_values["b"]
-    low, high = confidence_intervals.confidence_interval(search, found, "b")
+    low, high = confidence_intervals.compute_confidence_interval(search, found, "b")
     # To first order, the squared distances have an error of 20 % on the side where the
     # likelihood is nearly parabolic.
     for end, slack in ((low, 0.25), (high, 0.06)):

@@ -77,19 +77,20 @@ def test_derivatives_are_those_of_the_augmented_equations(
     friction, exact = synthetic.friction_and_sensitivities(law, times, loading, truth)
     model = model_of(law, loading, times, friction)
     # The tolerance is ten times the requested accuracy.
-    assert np.abs(model.model_friction(truth) - friction).max() < 1e-8 * truth["a"]
+    assert np.abs(model.compute_model_friction(truth) - friction).max() < 1e-8 * truth["a"]
     largest = np.abs(exact).max(axis=0)
     fine = (
         np.abs(
-            model.jacobian(truth, SENSITIVITY_PARAMETERS, ACCURATE_DIFFERENCE_SCHEME) - exact
+            model.compute_jacobian(truth, SENSITIVITY_PARAMETERS, ACCURATE_DIFFERENCE_SCHEME)
+            - exact
         ).max(axis=0)
         / largest
     )
     assert (fine < 1e-6).all(), fine
     quick = (
-        np.abs(model.jacobian(truth, SENSITIVITY_PARAMETERS, QUICK_DIFFERENCE_SCHEME) - exact).max(
-            axis=0
-        )
+        np.abs(
+            model.compute_jacobian(truth, SENSITIVITY_PARAMETERS, QUICK_DIFFERENCE_SCHEME) - exact
+        ).max(axis=0)
         / largest
     )
     assert (quick < 2e-3).all(), quick  # This accuracy is sufficient for the optimisation.
@@ -99,7 +100,7 @@ def test_derivatives_by_offset_trend_and_time_of_a_step() -> None:
     times = synthetic.sample_times(STEP_UP, 50.0, 202)[1:]
     friction, _exact = synthetic.friction_and_sensitivities("slip", times)
     model = model_of("slip", STEP_UP, times, friction)
-    found = model.jacobian(
+    found = model.compute_jacobian(
         EXACT_PARAMETERS | {"step_time": 0.0}, ("mu_star", "trend2", "step_time")
     )
     assert (found[:, 0] == 1.0).all()
@@ -138,6 +139,6 @@ def test_derivatives_at_the_ends_of_the_family(exponent: float) -> None:
     del synthetic.LAW_FUNCTIONS["any"]
     weights = {1: 0.75, 2: -0.15, 3: 1.0 / 60.0}
     exact = sum(w / 0.02 * (moved[n] - moved[-n]) for n, w in weights.items())
-    found = model.jacobian(truth, ("law_exponent",), ACCURATE_DIFFERENCE_SCHEME)[:, 0]
+    found = model.compute_jacobian(truth, ("law_exponent",), ACCURATE_DIFFERENCE_SCHEME)[:, 0]
     # The one-sided difference has an error of third order in its step of 0.005.
     assert np.abs(found - exact).max() < 2e-5 * np.abs(exact).max()

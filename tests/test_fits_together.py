@@ -81,12 +81,12 @@ def test_derivatives_of_windows_are_differences() -> None:
     plainly = {n: EXACT_PARAMETERS[n] for n in ("a", "b", "slip_distance", "stiffness")}
     values = plainly | {"mu_star_1": 0.6, "mu_star_2": 0.5, "trend1_1": 1e-5, "trend1_2": -2e-5}
     free = ("a", "slip_distance", "mu_star_2", "trend1_1")
-    found = joint.jacobian(values, free)
+    found = joint.compute_jacobian(values, free)
 
     def friction(name: str, by: float) -> np.ndarray:
         moved = values[name] * math.exp(by) if name == "slip_distance" else values[name] + by
         changed = values | {name: moved}
-        return joint.model_friction(changed) + joint.compute_friction_trend(changed)
+        return joint.compute_model_friction(changed) + joint.compute_friction_trend(changed)
 
     for column, name in enumerate(free):
         step = 1e-3 if name == "slip_distance" else 1e-5

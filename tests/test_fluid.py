@@ -18,14 +18,14 @@ import rsfstudy
 from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.engines import ENGINE_NAMES
 from rsfstudy.motion.events import EventKind, maximum
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
+from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, Recording
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
-    equations_at_imposed_slip_rate,
+    build_equations_at_imposed_slip_rate,
 )
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
@@ -78,7 +78,7 @@ def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, 
     weakening = (0.76 + (a - b) * log_slip_rate) * scene.dilatancy
     assume(weakening < 0.95 * (b - a))
     exact = closed_form(a, b, weakening, drainage * math.exp(-log_slip_rate))
-    ours = stability.critical_stiffness(scene, log_slip_rate)
+    ours = stability.compute_critical_stiffness(scene, log_slip_rate)
     # The slopes of the law are differences of order eight, and roots of polynomials lose digits
     # if drainage is much faster or slower than slip (up to c = 1.5e6).
     assert ours == pytest.approx(exact, rel=1e-9)
@@ -115,7 +115,7 @@ def test_growth_rates_with_a_porosity_length(dilatancy, log_length, log_drainage
     assert 0.0 < critical < math.inf
     for ratio in (0.98, 1.02):
         exact = compaction_polynomial(scene, ratio * critical)
-        ours = stability.linear_growth_rates(scene.with_(stiffness=ratio * critical), 0.0)
+        ours = stability.compute_linear_growth_rates(scene.with_(stiffness=ratio * critical), 0.0)
         assert bool(exact.real.max() > 0.0) is (ratio < 1.0)
         # The roots of a polynomial lose digits if two roots are close to each other.
         assert ours.real.max() == pytest.approx(exact.real.max(), rel=1e-5, abs=1e-9)
@@ -225,15 +225,15 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage, dilatancy,
     r = 1.0 / length
     x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
     recording = Recording(sample_times=np.array([0.1, 0.7, 2.0, 5.0]))
-    equations = equations_at_imposed_slip_rate(scene, x)
+    equations = build_equations_at_imposed_slip_rate(scene, x)
     path = Integrator(Accuracy()).follow_equations(
         equations, (start, 0.0, 0.0), local_tolerance=1e-11, recording=recording
     )
-    next(event for event in path if event.kind is EventKind.SAMPLED)
+    next(event for event in path if event.kind is EventKind.ALL_SAMPLES_RECORDED)
     for row, asked in zip(recording.as_table(scene), recording.sample_times, strict=True):
         slip, friction = (
-            row[RECORDED_VARIABLES.index("slip")],
-            row[RECORDED_VARIABLES.index("frictional_stress")] - 0.76,
+            row[RECORDED_VARIABLE_NAMES.index("slip")],
+            row[RECORDED_VARIABLE_NAMES.index("frictional_stress")] - 0.76,
         )
         porosity, pressure = row[FIRST_STATE_COLUMN + 1 :]
         assert slip == asked
@@ -245,9 +245,9 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage, dilatancy,
         # The tolerance per step is 1e-11 times a, and the errors of hundreds of steps
         # accumulate.
         assert friction == pytest.approx(stress, abs=1e-10)
-        ratio = row[RECORDED_VARIABLES.index("normal_stress_ratio")]
+        ratio = row[RECORDED_VARIABLE_NAMES.index("normal_stress_ratio")]
         assert ratio == pytest.approx(1.0 - exact, abs=1e-10)
-        point = equations.evaluate_point((friction, porosity, pressure))
+        point = equations.evaluate_motion_point((friction, porosity, pressure))
         assert point.friction_coefficient == pytest.approx(coefficient, abs=1e-10)
 
 
@@ -374,12 +374,14 @@ def test_a_fluid_of_your_own(law):
     """
     scene = Scene(law=law, fluid=Tight, opening=0.004, **CONSTANT)
     assert scene.critical_stiffness == pytest.approx(0.0145 - 0.76 * 0.004, rel=1e-11)
-    assert np.abs(stability.linear_growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
+    assert (
+        np.abs(stability.compute_linear_growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
+    )
     slipped = simulate(scene.with_(stiffness=0.02, load_velocity_ratio=1.5), duration=3.0)
     np.testing.assert_allclose(slipped["porosity"], -slipped["pore_pressure"], atol=1e-12)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("stress", [{"normal_stress": "constant"}, {"alpha": 0.2}])
 def test_a_rig_knows_nothing_of_the_pressure_inside_the_fault(stress, engine):
     """The apparent friction does not include the pressure inside the fault.

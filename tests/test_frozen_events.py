@@ -17,9 +17,9 @@ from frozen_motion_comparison import (
 from frozen_scenes import MOTIONS
 
 from rsfstudy import Scene
-from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.engines import ENGINE_NAMES
 from rsfstudy.motion.events import EventKind
-from rsfstudy.slider.part_registry import SLOTS
+from rsfstudy.slider.part_registry import PART_SLOTS
 
 #: Tolerance of the differences from ``frozen_motion_comparison.largest_differences``. The last
 #: bits depend on the CPU, for example on its exponentials, the order of sums, and fused
@@ -39,7 +39,7 @@ with FROZEN_EVENTS_FILE.open() as file:
     KEPT = json.load(file)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("name", MOTIONS)
 def test_events_are_as_they_were(name, engine):
     now, kept = record_frozen_motion(MOTIONS[name], engine), KEPT[name]
@@ -57,12 +57,12 @@ def test_what_is_kept_is_all_there_is():
     """The small file covers every part and every kind of event."""
     assert set(KEPT) == set(MOTIONS)
     parts = {type(p) for motion in MOTIONS.values() for p in Scene(**motion.fields).parts}
-    assert parts >= {part for slot in SLOTS for part in slot.built_in_parts.values()}
+    assert parts >= {part for slot in PART_SLOTS for part in slot.built_in_parts.values()}
     assert {text.split()[0] for kept in KEPT.values() for text in kept["kinds"]} >= set(EventKind)
     assert FROZEN_EVENTS_FILE.stat().st_size < 300 * 1024
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_what_moves_is_seen(engine):
     """A relative change of 1e-10 of a field is detected.
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 from rsfstudy import Scene, history, protocol, simulate
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 
 PLAIN = {"normal_stress": "constant", "a": 0.01, "b_over_a": 1.4, "law": "slowness"}
 IMPOSED = PLAIN | {"normal_stress": "imposed"}
@@ -39,7 +39,7 @@ SCENES = {
 WHAT = ["shear_stress", "log10_slip_rate", "slip", "state_variable", "load_point_displacement"]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("name", SCENES)
 def test_a_cut_changes_nothing(name, engine, tmp_path):
     """A motion can be interrupted anywhere and stored in a file.

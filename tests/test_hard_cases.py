@@ -19,7 +19,7 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.limit_cycles.stick_slip_cycles import iterate_cycles
+from rsfstudy.limit_cycles.stick_slip_cycles import iterate_stick_slip_cycles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.integrator import Integrator
@@ -78,7 +78,7 @@ def test_two_hundred_cycles_do_not_drift():
     )
     intervals = []
     accuracy = Accuracy(1e-5, budget=10**7, engine=COMPILED)
-    for cycle in iterate_cycles(scene, Integrator(accuracy), None):
+    for cycle in iterate_stick_slip_cycles(scene, Integrator(accuracy), None):
         intervals.append(cycle.recurrence_interval)
         if len(intervals) == 203:
             break

@@ -33,9 +33,12 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.parts import LAW, Law, NormalStress, Temperature, number
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider.equations import equations_between_ruptures
-from rsfstudy.slider.stability import critical_stiffness, linear_growth_rates
-from rsfstudy.slider.steady_state import steady_friction_minus_reference, steady_sliding
+from rsfstudy.slider.equations import build_equations_between_ruptures
+from rsfstudy.slider.stability import compute_critical_stiffness, compute_linear_growth_rates
+from rsfstudy.slider.steady_state import (
+    compute_steady_friction_minus_reference,
+    compute_steady_sliding,
+)
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant", "a": 0.01, "mu_star": 0.6}
@@ -81,10 +84,12 @@ HOT = heated(1e-3, 0.1, 35.0, 35.0)
 def test_steady_friction_and_stability_of_flash_heating(rate, friction, stiffness):
     """Both equal the independent values, and the stiffness is minus the slope of friction."""
     scene, x = Scene(**FLASH, stiffness=0.01), math.log(rate)
-    assert 0.6 + steady_friction_minus_reference(scene, x) == pytest.approx(friction, abs=6e-15)
-    found = critical_stiffness(scene, x)
+    assert 0.6 + compute_steady_friction_minus_reference(scene, x) == pytest.approx(
+        friction, abs=6e-15
+    )
+    found = compute_critical_stiffness(scene, x)
     assert found == pytest.approx(stiffness, rel=1e-11)
-    ahead, behind = (steady_friction_minus_reference(scene, x + h) for h in (1e-3, -1e-3))
+    ahead, behind = (compute_steady_friction_minus_reference(scene, x + h) for h in (1e-3, -1e-3))
     assert found == pytest.approx((behind - ahead) / 2e-3, rel=2e-5)
 
 
@@ -141,14 +146,14 @@ def test_too_little_cooling_is_unstable_at_every_stiffness():
 )  # fmt: skip
 def test_steady_friction_with_shear_heating(log10_rate, friction):
     scene = Scene(**COLD, **HOT)
-    found = 0.6 + steady_friction_minus_reference(scene, log10_rate * math.log(10.0))
+    found = 0.6 + compute_steady_friction_minus_reference(scene, log10_rate * math.log(10.0))
     assert found == pytest.approx(friction, abs=6e-13)
 
 
 def test_steady_temperature_is_that_of_heating_and_cooling():
     scene = Scene(**COLD, **HOT)
     for rate, rise in ((10.0, 0.053741214302), (100.0, 0.639215782106)):
-        found = steady_sliding(scene, math.log(rate))
+        found = compute_steady_sliding(scene, math.log(rate))
         assert found.states[1] == pytest.approx(rise, abs=6e-13)
         friction = 0.6 + found.frictional_stress
         assert found.states[1] == pytest.approx(0.01 * (friction * rate - 0.6), rel=1e-12)
@@ -169,7 +174,7 @@ def test_heating_changes_weakening_to_strengthening(
     """
     fields = {"normal_stress": "constant", "a": a, "b_over_a": b_over_a, "mu_star": mu_star}
     scene = Scene(**fields, stiffness=0.1, **heated(over_cooling, 1.0, direct, evolution))
-    friction = functools.partial(steady_friction_minus_reference, scene)
+    friction = functools.partial(compute_steady_friction_minus_reference, scene)
 
     def slope(x):
         return (8 * (friction(x + 0.01) - friction(x - 0.01))
@@ -178,7 +183,7 @@ def test_heating_changes_weakening_to_strengthening(
     x = math.log(rate)
     assert brentq(slope, x - 0.5, x + 0.5, xtol=1e-12) == pytest.approx(x, abs=1e-8)
     for at in (x - 1.0, x + 0.5):
-        rise = steady_sliding(scene, at).states[1]
+        rise = compute_steady_sliding(scene, at).states[1]
         turning = a * (b_over_a * evolution - direct) / (1.0 + rise) ** 2
         turning *= over_cooling * math.exp(at)
         closed = (a - a * b_over_a + turning * (mu_star + friction(at))) / (1.0 - turning)
@@ -315,7 +320,7 @@ def test_limit_cycles(name, engine):
 @pytest.mark.parametrize("drainage", [0.1, 0.3])
 def test_motions_with_growing_perturbations_do_not_settle(drainage):
     scene = Scene(**COLD, **DAMPED, **pressurised(0.01, 0.01, drainage))
-    assert linear_growth_rates(scene, scene.log_load_velocity)[0].real > 0.1
+    assert compute_linear_growth_rates(scene, scene.log_load_velocity)[0].real > 0.1
     outcome = LimitCycle(phases=2)(scene, Accuracy(1e-5, engine=COMPILED))
     assert outcome.status is Status.OK
 
@@ -375,7 +380,7 @@ def test_only_the_effects_of_a_scene_are_unknowns():
         assert hot.with_(fluid="dilatant").state_count == states + 3
         waves = {"normal_stress": "imposed", "oscillation_amplitude": 0.1}
         assert hot.with_(**waves).state_count == states + 3
-    names = equations_between_ruptures(
+    names = build_equations_between_ruptures(
         Scene(**COLD, **pressurised(1e-3, 1.0, 1.0), dilatancy=0.001), with_time=False
     ).unknown_names
     expected = ("spring_stress", "psi", "temperature_rise", "porosity", "pore_pressure")
@@ -447,10 +452,10 @@ def test_the_work_of_shear_stress_heats_the_fault(law, stress):
         **fields, **STRESSES[stress], load_velocity_ratio=3.0,
         **heated(heating, cooling, direct, evolution),
     )  # fmt: skip
-    system = equations_between_ruptures(scene, with_time=True)
+    system = build_equations_between_ruptures(scene, with_time=True)
     others = [0.013, -0.02, 0.03][: scene.state_count - 2]
     state = (0.02, -0.004, 0.07, *others, 0.0)
-    rates, point = system.evaluate_rates(state), system.evaluate_point(state)
+    rates, point = system.evaluate_rates(state), system.evaluate_motion_point(state)
     velocity, rise = math.exp(point.log_slip_rate), state[2]
     shear_stress = point.friction_coefficient * point.normal_stress
     warming = heating * (shear_stress * velocity - 0.6) - cooling * rise
@@ -540,7 +545,7 @@ class QuadraticCooling(Temperature):
 def test_a_temperature_of_a_user():
     """A user-defined temperature without activation terms does not change the motion."""
     scene = Scene(**COLD, **DAMPED, temperature=QuadraticCooling, loss=0.3)
-    found = steady_sliding(scene, 2.0)
+    found = compute_steady_sliding(scene, 2.0)
     warming = 1e-3 * ((0.6 + found.frictional_stress) * math.exp(2.0) - 0.6)
     rise = found.states[1]
     assert 0.3 * (rise + rise**2) == pytest.approx(warming, rel=1e-12)
@@ -568,8 +573,10 @@ def test_the_named_combinations_are_complete():
     """Every law with one state accepts the temperature, and each fluid accepts shear heating."""
     from rsfstudy.slider import fluid, laws
 
-    for law, pores in itertools.product(laws.BUILT_IN_PARTS, fluid.BUILT_IN_PARTS):
-        several = laws.BUILT_IN_PARTS[law].state_count > 1
+    for law, pores in itertools.product(
+        laws.BUILT_IN_LAW_CLASS_BY_NAME, fluid.BUILT_IN_FLUID_CLASS_BY_NAME
+    ):
+        several = laws.BUILT_IN_LAW_CLASS_BY_NAME[law].state_count > 1
         heat = heated(1e-4, 1.0) if several else heated(1e-4, 1.0, 20.0, 20.0)
         scene = Scene(law=law, fluid=pores, stiffness=0.01, normal_stress="constant", **heat)
         assert "shear_heating" in scene.effects

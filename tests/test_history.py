@@ -28,7 +28,7 @@ from rsfstudy import (
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.step_response import StepResponse
 
@@ -54,7 +54,7 @@ def wave(samples, period=4.0):
     return {"time": time, "displacement": time + 0.4 * np.sin(2.0 * np.pi * time / period)}
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("slider", SLIDERS)
 def test_steps_as_a_history_tell_what_the_steps_do(slider, engine):
     steps = protocol([{"velocity": 3.0, "duration": 5.5}, {"velocity": 0.5, "duration": 8.0},
@@ -77,7 +77,7 @@ def test_finer_samples_where_it_is_linear_change_nothing(slider):
     np.testing.assert_allclose(told(history(between), slider), known, atol=3e-7, rtol=0.0)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_sampled_normal_stress_is_a_ramp(engine):
     fields = {"normal_stress": "variable", "phi": 70.0}
     ramp = Scene(**PLAIN | fields, normal_stress_ramp=-0.2, ramp_duration=8.0)
@@ -100,7 +100,7 @@ def test_a_step_of_normal_stress_at_the_first_sample_is_one():
         np.testing.assert_allclose(numbers, known[name], atol=1e-7)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_a_sample_costs_one_step(engine):
     """A sample costs about 13 evaluations, which is a single step.
 

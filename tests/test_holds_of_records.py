@@ -186,7 +186,7 @@ def test_fit_uses_the_stiffness_of_the_record() -> None:
     with pytest.raises(InvalidValue, match="portion of the record in which the fault is locked"):
         rsfstudy.fit(flat, stiffness="from record", laws=["slowness"])
     held = synthetic.synthetic_record(synthetic.SLIDE_HOLD_SLIDE, size=1e-4)
-    ratio, machine, spread = fit_record._measure_stiffness([held])
+    ratio, machine, spread = fit_record._measure_stiffness_in_records([held])
     assert machine == 0.0
     assert 0.0 < spread < 0.2
     assert abs(np.log(ratio / synthetic.EXACT_PARAMETERS["stiffness"])) < 3.0 * spread

@@ -19,7 +19,7 @@ from study_runs import call_main, run_command
 
 from rsfstudy.cli import command_line
 from rsfstudy.cli.command_line import cli
-from rsfstudy.cli.console import PlainConsole
+from rsfstudy.cli.console import LiteralTextConsole
 
 LONG = "x" * 300
 TOO_LONG = "must have at most 255 bytes in each part"
@@ -143,7 +143,7 @@ def test_a_full_disk_is_named_whatever_prints(monkeypatch):
     ("columns", "width"), [("0", 16), ("1", 16), ("120", 120), ("9" * 11, 1000)]
 )
 def test_any_width_of_the_environment_is_bounded(columns, width):
-    printed = PlainConsole(file=io.StringIO(), _environ={"COLUMNS": columns})
+    printed = LiteralTextConsole(file=io.StringIO(), _environ={"COLUMNS": columns})
     assert printed.width == width
     printed.print("a study")
     assert printed.file.getvalue() == "a study\n"

@@ -26,7 +26,7 @@ import rsfstudy
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.referee import problem_files
 from rsfstudy.storage import dataset_files
-from rsfstudy.storage.cell_journal import CellJournal, CellTimings
+from rsfstudy.storage.cell_journal import CellJournal, CellWallTimes
 
 LONG = 130_000
 
@@ -119,9 +119,9 @@ def test_a_journal_with_a_hostile_fingerprint_is_refused_and_not_locked(
     with pytest.raises(DataError, match="its fingerprint is damaged") as refused:
         CellJournal(path, {"rtol": 1e-7}, LAYOUT)
     assert refused.value.__traceback__ is not None  # The traceback keeps its frames alive.
-    assert CellTimings.read(path) is None
+    assert CellWallTimes.read_from_journal(path) is None
     with CellJournal(path, {"rtol": 1e-7}, LAYOUT, fresh=True) as again:
-        assert again.statuses(np.empty(0, dtype="V16")).size == 0
+        assert again.read_statuses(np.empty(0, dtype="V16")).size == 0
 
 
 # ---- attributes ----------------------------------------------------------------------------------

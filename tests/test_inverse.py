@@ -9,9 +9,11 @@ import pytest
 import xarray as xr
 
 from rsfstudy.reductions import Inverse, apply_reductions
-from rsfstudy.study.reductions._level_crossing import CrossingStatus
+from rsfstudy.study.reductions._level_crossing import CrossingSearchStatus
 
-OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW = (float(verdict) for verdict in CrossingStatus)
+OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW = (
+    float(verdict) for verdict in CrossingSearchStatus
+)
 
 
 def inverted(x, y, level):

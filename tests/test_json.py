@@ -29,7 +29,7 @@ from rsfstudy import Scene
 from rsfstudy.cli import commands, results, study_results
 from rsfstudy.cli.command_group import CommandGroup
 from rsfstudy.cli.command_line import cli
-from rsfstudy.referee.problem_files import shipped_problem_files
+from rsfstudy.referee.problem_files import find_shipped_problem_files
 from rsfstudy.storage import dataset_files
 
 TEXT = (PAGES / "reference" / "json.md").read_text()
@@ -388,7 +388,7 @@ def test_show_a_motion_and_a_critical_step(tmp_path):
 
 
 def test_verify(tmp_path):
-    answer = shipped_problem_files()[19].with_suffix(".csv")
+    answer = find_shipped_problem_files()[19].with_suffix(".csv")
     found, status = output_of("verify", answer)
     assert_documented(found)
     assert status == 0

@@ -22,15 +22,15 @@ from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import laws, steady_state
 from rsfstudy.slider.friction import build_state_evolution_function, compute_steady_states
-from rsfstudy.slider.laws.composite import lambert_w
-from rsfstudy.slider.path_length import velocity_ratios
+from rsfstudy.slider.laws.composite import compute_lambert_w
+from rsfstudy.slider.path_length import compute_velocity_ratios
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
 CUT_OFFS = ("composite", "cut_off")
 
 
-@pytest.mark.parametrize("law", sorted(laws.BUILT_IN_PARTS))
+@pytest.mark.parametrize("law", sorted(laws.BUILT_IN_LAW_CLASS_BY_NAME))
 def test_every_law_rests_where_it_says(law):
     """States are at rest in steady sliding and return after a perturbation.
 
@@ -56,7 +56,9 @@ def test_every_law_rests_where_it_says(law):
 @pytest.mark.parametrize("law", CUT_OFFS)
 def test_friction_is_mu_star_at_the_reference_rate(law, cutoff):
     scene = Scene(law=law, cutoff_velocity_ratio=cutoff, stiffness=0.01)
-    assert steady_state.steady_friction_minus_reference(scene, 0.0) == pytest.approx(0.0, abs=1e-16)
+    assert steady_state.compute_steady_friction_minus_reference(scene, 0.0) == pytest.approx(
+        0.0, abs=1e-16
+    )
 
 
 @given(st.floats(-3000.0, 30.0), st.floats(-60.0, 60.0), st.floats(-20.0, 5.0))
@@ -72,8 +74,8 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_slip_rate, log_th
 
     def evolving(law: str) -> float:
         scene = Scene(law=law, a=0.5 * b, load_velocity_ratio=load)
-        x, _slower, share = velocity_ratios(log_slip_rate, scene.parameter_values)
-        return scene.friction_functions.evolutions(
+        x, _slower, share = compute_velocity_ratios(log_slip_rate, scene.parameter_values)
+        return scene.friction_functions.state_evolutions(
             x, (b * log_theta,), 0.0, share, scene.parameter_values
         )[0]
 
@@ -116,7 +118,7 @@ def test_cut_offs_beyond_all_slip_leave_plainer_laws(log_slip_rate, log_theta):
 
 @given(st.floats(0.0, 1.0))
 def test_lambert_w(value):
-    w = lambert_w(value)
+    w = compute_lambert_w(value)
     assert w * math.exp(w) == pytest.approx(value, rel=4e-16, abs=1e-320)
 
 
@@ -167,7 +169,10 @@ def test_a_rigid_slider_follows_the_closed_form(fields, rate):
 
 
 def test_steps_to_either_side_mirror_one_another_by_symmetric_laws_alone():
-    scenes = (Scene(law=law, load_velocity_ratio=100.0, **CONSTANT) for law in laws.BUILT_IN_PARTS)
+    scenes = (
+        Scene(law=law, load_velocity_ratio=100.0, **CONSTANT)
+        for law in laws.BUILT_IN_LAW_CLASS_BY_NAME
+    )
     for scene in scenes:
         found = RigidResponse()(scene, Accuracy(1e-6)).values["evolution_distance"]
         inverse = scene.with_(load_velocity_ratio=0.01)
@@ -215,7 +220,7 @@ def test_with_any_b_below_a_every_spring_slides_steadily_in_the_end(law, b):
     accuracy = Accuracy(engine="compiled")
     assert scene.critical_stiffness == 0.0
     assert LimitCycle()(scene, accuracy).status is Status.NO_LIMIT_CYCLE
-    end = steady_state.steady_sliding(scene, scene.log_load_velocity)
+    end = steady_state.compute_steady_sliding(scene, scene.log_load_velocity)
     assert end is not None
     if law in ("slip", "slowness", "perrin_rice_zheng"):
         assert end.frictional_stress == pytest.approx(

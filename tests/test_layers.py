@@ -185,10 +185,10 @@ def test_studies_load_nothing_that_draws():
 
 def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_path):
     """A worker receives the measure of a study, but no plots or reductions."""
-    for name in study_index.study_names():
+    for name in study_index.list_study_names():
         study = study_loader.load_study(name)
-        task = cell_computation.CellTask(study.base, study.measure, study.accuracy)
-        (tmp_path / name).write_bytes(cell_computation.serialize_task(task))
+        task = cell_computation.SharedCellSettings(study.base, study.measure, study.accuracy)
+        (tmp_path / name).write_bytes(cell_computation.serialize_cell_settings(task))
     heavy = {"xarray", "pandas", "matplotlib", "netCDF4", "numba"}
     asked = (
         "import pathlib, pickle, sys, rsfstudy.execution.cell_computation\n"
@@ -197,7 +197,7 @@ def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_pa
         f"print(*{heavy} & set(sys.modules))"
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    assert ran.stdout.split("\n") == [str(len(study_index.study_names())), "", ""]
+    assert ran.stdout.split("\n") == [str(len(study_index.list_study_names())), "", ""]
 
 
 HEAVY = (

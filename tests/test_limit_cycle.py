@@ -16,7 +16,7 @@ from rsfstudy import Scene
 from rsfstudy.errors import NoResultWarning
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.recording import MOTION_VARIABLES
+from rsfstudy.motion.recording import MOTION_VARIABLE_NAMES
 from rsfstudy.status import Status
 
 CASES = [
@@ -101,7 +101,7 @@ def test_an_orbit_of_two_points_is_the_ends_of_any(case):
         if name.endswith("_error"):
             assert 0.5 * values <= ends.values[name] <= 2.0 * values, name
             continue
-        same, off = (values[[0, -1]], 1e-6) if name in MOTION_VARIABLES else (values, 1e-12)
+        same, off = (values[[0, -1]], 1e-6) if name in MOTION_VARIABLE_NAMES else (values, 1e-12)
         assert ends.values[name] == pytest.approx(same, rel=off, abs=off, nan_ok=True), name
 
 

@@ -19,7 +19,7 @@ from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
-from rsfstudy.slider.stability import linear_growth_rates
+from rsfstudy.slider.stability import compute_linear_growth_rates
 from rsfstudy.status import Status
 
 
@@ -92,7 +92,7 @@ def test_jumps_between_segments_are_told():
         until=8.0,
     )
     kinds = [event.kind for event in jump]
-    assert kinds[:4] == [EventKind.START, EventKind.SEGMENT, EventKind.RISE, EventKind.FALL]
+    assert kinds[:4] == [EventKind.START, EventKind.SEGMENT_START, EventKind.RISE, EventKind.FALL]
     assert [event.time for event in jump[1:3]] == [5.0, 5.0]
     assert kinds.count(EventKind.END) == 1
     held = told(scene((10.0, 0.0, 0.05), (0.0, 0.0)), maximum("spring_stress"), until=1.0)
@@ -184,8 +184,8 @@ def test_steady_sliding_and_its_stability_are_those_before_normal_stress_changes
     assert scene.stiffness == still.stiffness
     if "normal_stress_step" in change:  # After the step, steady sliding occurs at another stress.
         return
-    rates = linear_growth_rates(still, still.log_load_velocity)
-    assert linear_growth_rates(scene, scene.log_load_velocity) == pytest.approx(rates)
+    rates = compute_linear_growth_rates(still, still.log_load_velocity)
+    assert compute_linear_growth_rates(scene, scene.log_load_velocity) == pytest.approx(rates)
     one, other = (LinearStability()(which, Accuracy()) for which in (scene, still))
     assert one.status is other.status is Status.OK
     assert dict(one.values) == pytest.approx(dict(other.values), rel=1e-12, nan_ok=True)

@@ -187,13 +187,13 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
 def test_the_file_alone_reproduces_its_cells(tmp_path):
     found = run(BOTH, output=tmp_path).sel(direction="down", b_over_a=3.0)
     file = tmp_path / "both.nc"
-    restored = rebuild_from_file.study_from_declaration(
-        schema.read_declaration(rsfstudy.open(file)), {}
+    restored = rebuild_from_file.build_study_from_declaration(
+        schema.read_study_declaration(rsfstudy.open(file)), {}
     )
     assert restored.describe() == BOTH.describe()
     xr.testing.assert_identical(
-        xr.Dataset(coords=CellPlan(restored).coordinates),
-        xr.Dataset(coords=CellPlan(BOTH).coordinates),
+        xr.Dataset(coords=CellPlan(restored).lattice_coordinates),
+        xr.Dataset(coords=CellPlan(BOTH).lattice_coordinates),
     )
     table = rsfstudy.rerun(file, workers=0, progress=False)
     assert (table["values"] == table["identical"]).all()

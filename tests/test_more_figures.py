@@ -11,7 +11,7 @@ from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.errors import DataError
 from rsfstudy.plots import _text, lines
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.rig.dataset_scales import UnitScale, convert_dataset_by_unit_scales
+from rsfstudy.rig.dataset_scales import UnitScale, multiply_variables_by_unit_scales
 from rsfstudy.status import Status
 from rsfstudy.study import study_loader
 
@@ -114,7 +114,9 @@ def test_a_legend_beside_a_scale_of_colours_leaves_the_panel_its_room():
         Axis("normal_stress", ["constant", "variable", "imposed"]),
     ]
     dataset = run(Study(name="n", title="", base=Scene(), axes=axes, measure=LinearStability()))
-    drawn = plots.draw_figure(dataset, rsfstudy.Figure(lines.panels(dataset, "critical_stiffness")))
+    drawn = plots.draw_figure(
+        dataset, rsfstudy.Figure(lines.build_panels_of_figure(dataset, "critical_stiffness"))
+    )
     assert drawn.axes[0].get_position().width > 0.55
 
 
@@ -133,7 +135,7 @@ def test_what_is_in_units_is_called_no_ratio():
     held = {"scale": "D_c", "units": "1", "long_name": "load point displacement"}
     ratio = xr.Dataset({"moved": ((), 2.0, {**held, "symbol": r"$\delta_0/D_c$"})})
     scales = {"D_c": UnitScale(10.0, "um"), "V_*": UnitScale(1.0, "um s-1")}
-    moved = convert_dataset_by_unit_scales(ratio, scales)["moved"]
+    moved = multiply_variables_by_unit_scales(ratio, scales)["moved"]
     assert moved.attrs == {"units": "um", "long_name": "load point displacement"}
 
 
@@ -145,6 +147,6 @@ def test_labels_of_errors_of_samples_are_short(tmp_path_factory):
 
 
 def test_errors_too_small_to_show_are_left_out():
-    assert _text.format_with_error(1.33333334, 8e-9, 4) == "$1.3333$"
-    assert _text.format_with_error(0.857, 0.007, 4) == r"$0.857 \pm 0.007$"
-    assert _text.format_with_error(0.857, 0.00006, 4) == r"$0.85700 \pm 0.00006$"
+    assert _text.format_value_with_error(1.33333334, 8e-9, 4) == "$1.3333$"
+    assert _text.format_value_with_error(0.857, 0.007, 4) == r"$0.857 \pm 0.007$"
+    assert _text.format_value_with_error(0.857, 0.00006, 4) == r"$0.85700 \pm 0.00006$"

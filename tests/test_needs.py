@@ -10,7 +10,10 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
 from rsfstudy.slider.laws import Law
-from rsfstudy.slider.needed_quantities import QUANTITIES_A_PART_MAY_NEED, quantities_known_to_part
+from rsfstudy.slider.needed_quantities import (
+    QUANTITIES_A_PART_MAY_NEED,
+    find_quantities_known_to_part,
+)
 from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A
 
 
@@ -69,7 +72,7 @@ def test_a_scene_refuses_a_law_whose_stress_it_does_not_provide(fields, cause, r
 @pytest.mark.parametrize("fields", [{}, {"inertia": True}, {"velocity_oscillation": 0.1}])
 def test_constant_normal_stress_provides_shear_stress(fields):
     scene = Scene(law=Heated, **CONSTANT, **fields)
-    assert "shear_stress" in quantities_known_to_part(scene, scene.parts.law)
+    assert "shear_stress" in find_quantities_known_to_part(scene, scene.parts.law)
     with pytest.raises(InvalidValue, match="normal_stress='variable'"):
         scene.with_(normal_stress="variable")
 
@@ -102,6 +105,6 @@ def test_needs_is_a_set_of_known_names(given, said):
 
 def test_dynamics_receive_every_quantity():
     scene = Scene(normal_stress="variable", fluid="dilatant")
-    assert quantities_known_to_part(scene, scene.parts.dynamics) == frozenset(
+    assert find_quantities_known_to_part(scene, scene.parts.dynamics) == frozenset(
         QUANTITIES_A_PART_MAY_NEED
     )

@@ -11,7 +11,7 @@ from rsfstudy.motion.events import maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
 from rsfstudy.motion.recording import REGIME_COLUMN, Recording
-from rsfstudy.responses._motion_readings import growth_rate_along_path
+from rsfstudy.responses._motion_readings import compute_growth_rate_along_path
 from rsfstudy.responses.healing import Healing
 from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider.equations import RUPTURE_REGIME
@@ -78,7 +78,7 @@ def recorded(scene, rtol):
 def test_a_scene_without_inertia_neglects_none():
     scene = Scene(law="slip", stiffness_ratio=2.0, load_velocity_ratio=3.0)
     recording, rows = recorded(scene, 1e-6)
-    slow = recording.index_of_regime(scene.dynamics.regime)
+    slow = recording.get_or_add_regime_index(scene.dynamics.regime)
     assert not estimate_neglected_inertia_error(scene, rows, slow, 0.0).any()
 
 
@@ -92,7 +92,7 @@ def test_estimate_goes_with_the_accuracy():
     scene, found = CASES[2][2], []
     for rtol in (1e-4, 1e-5, 1e-6, 1e-8):
         recording, rows = recorded(scene, rtol)
-        slow = recording.index_of_regime(scene.dynamics.regime)
+        slow = recording.get_or_add_regime_index(scene.dynamics.regime)
         estimate = estimate_neglected_inertia_error(scene, rows, slow, 0.0)
         assert (np.diff(estimate) >= 0.0).all()
         found.append(estimate[-1] / rtol)
@@ -111,7 +111,7 @@ def test_growth_at_a_peak_has_one_unit_in_both_regimes():
         integrator = Integrator(Accuracy(rtol, 10_000_000, engine="compiled"))
         events = list(integrator.follow(scene, [wanted]))
         peak = next(event for event in events if event.specification == wanted)
-        growths[peak.regime] = growth_rate_along_path(scene, peak, 8.22991)
+        growths[peak.regime] = compute_growth_rate_along_path(scene, peak, 8.22991)
     assert set(growths) == {RUPTURE_REGIME, scene.dynamics.regime}
     first, second = growths.values()
     assert math.isclose(first, second, rel_tol=1e-2)

@@ -18,7 +18,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import EventStatistics, LimitCycle, Measure
 from rsfstudy.motion import rise
 from rsfstudy.motion.events import EventKind
-from rsfstudy.slider.noise_paths import Path
+from rsfstudy.slider.noise_paths import UnitNoisePath
 from rsfstudy.status import Status
 
 BASE = Scene(
@@ -55,34 +55,38 @@ TIMES = st.floats(min_value=1e-3, max_value=10.0)
 def test_a_path_depends_on_seed_and_time_only(
     seed, interval, first, count, correlation_time, power
 ):
-    path = Path(seed, 0, correlation_time)
-    values = path.sample(interval, first, count)
+    path = UnitNoisePath(seed, 0, correlation_time)
+    values = path.compute_samples(interval, first, count)
     assert np.isfinite(values).all()
     # Any section equals the same section of a longer path, and of a finer path.
-    longer = path.sample(interval, max(first - 3, 0), count + 7)
+    longer = path.compute_samples(interval, max(first - 3, 0), count + 7)
     np.testing.assert_array_equal(longer[min(first, 3) :][:count], values)
-    finer = path.sample(interval / 2**power, first * 2**power, (count - 1) * 2**power + 1)
+    finer = path.compute_samples(interval / 2**power, first * 2**power, (count - 1) * 2**power + 1)
     np.testing.assert_array_equal(finer[:: 2**power], values)
 
 
 def test_the_path_is_a_wiener_process():
     interval = 0.05
-    steps = np.diff([Path(seed, 0).sample(interval, 0, 2001) for seed in range(100)]) / math.sqrt(
-        interval
-    )
+    steps = np.diff(
+        [UnitNoisePath(seed, 0).compute_samples(interval, 0, 2001) for seed in range(100)]
+    ) / math.sqrt(interval)
     count = steps.size
     assert abs(steps.mean()) < 4.0 / math.sqrt(count)
     assert abs(steps.var() - 1.0) < 4.0 * math.sqrt(2.0 / count)
     assert abs((steps**4).mean() - 3.0) < 4.0 * math.sqrt(96.0 / count)
     for lag in (1, 2, 5):
         assert abs((steps[:, lag:] * steps[:, :-lag]).mean()) < 4.0 / math.sqrt(count)
-    ends = np.array([Path(seed, 0).sample(interval, 1000, 1)[0] for seed in range(1000)])
+    ends = np.array(
+        [UnitNoisePath(seed, 0).compute_samples(interval, 1000, 1)[0] for seed in range(1000)]
+    )
     assert abs(ends.var() / 50.0 - 1.0) < 4.0 * math.sqrt(2.0 / 1000)
 
 
 def test_streams_and_seeds_are_independent():
     paths = [
-        np.diff(Path(seed, stream).sample(0.1, 0, 4001)) for seed in (1, 2) for stream in (0, 1)
+        np.diff(UnitNoisePath(seed, stream).compute_samples(0.1, 0, 4001))
+        for seed in (1, 2)
+        for stream in (0, 1)
     ]
     correlations = np.corrcoef(paths)[~np.eye(4, dtype=bool)]
     assert np.abs(correlations).max() < 4.5 / math.sqrt(4000)
@@ -95,7 +99,7 @@ def test_variance_and_correlation_of_correlated_noise(interval):
     last = 400
     values = np.array(
         [
-            Path(seed, 0, time).sample(interval, last - lag, lag + 1)[[0, -1]]
+            UnitNoisePath(seed, 0, time).compute_samples(interval, last - lag, lag + 1)[[0, -1]]
             for seed in range(count)
         ]
     )
@@ -106,14 +110,16 @@ def test_variance_and_correlation_of_correlated_noise(interval):
         2.0 / count
     )
     # For short times, the path differs little from the Wiener process.
-    early = np.array([Path(seed, 0, 1e6).sample(interval, 4, 1)[0] for seed in range(count)])
+    early = np.array(
+        [UnitNoisePath(seed, 0, 1e6).compute_samples(interval, 4, 1)[0] for seed in range(count)]
+    )
     assert abs(early.var() / (4.0 * interval) - 1.0) < 4.0 * math.sqrt(2.0 / count)
 
 
 def test_known_values_of_a_path():
     """The values are part of the contract, because files store only the seed."""
     np.testing.assert_allclose(
-        Path(3, 0).sample(0.05, 0, 4),
+        UnitNoisePath(3, 0).compute_samples(0.05, 0, 4),
         [0.0, -0.2589843615, -0.0369369501, -0.0800173363],
         rtol=0.0,
         atol=1e-8,
@@ -142,7 +148,7 @@ def test_noise_of_zero_amplitude_changes_nothing():
 def test_the_noise_moves_the_load_point():
     """The stress of the noise equals a displacement of the load point."""
     motion = rsfstudy.simulate(NOISY, duration=5.0, engine="python")
-    values = NOISY.stress_noise * Path(1, 0).sample(0.25, 0, 21)
+    values = NOISY.stress_noise * UnitNoisePath(1, 0).compute_samples(0.25, 0, 21)
     expected = 1.0 * motion.time + np.interp(motion.time, 0.25 * np.arange(21), values) / 0.001
     np.testing.assert_allclose(motion.load_point_displacement, expected, atol=1e-6)
 
@@ -179,10 +185,12 @@ def test_noise_with_a_protocol():
     )
     scene = NOISY.with_(loading=protocol)
     events = list(Integrator(Accuracy(1e-9, engine="python")).follow(scene, until=4.0))
-    assert [e.time for e in events if e.kind is EventKind.SEGMENT] == pytest.approx([1.3, 2.4])
+    assert [e.time for e in events if e.kind is EventKind.SEGMENT_START] == pytest.approx(
+        [1.3, 2.4]
+    )
     motion = rsfstudy.simulate(scene, duration=4.0, engine="python")
     noise = scene.stress_noise * np.interp(
-        4.0, 0.25 * np.arange(17), Path(1, 0).sample(0.25, 0, 17)
+        4.0, 0.25 * np.arange(17), UnitNoisePath(1, 0).compute_samples(0.25, 0, 17)
     )
     expected = 1.3 + 3.3 + 1.6 + noise / scene.stiffness
     assert float(motion.load_point_displacement[-1]) == pytest.approx(expected, abs=1e-7)
@@ -202,7 +210,7 @@ def test_noise_of_normal_stress(kind):
     time = 2.0 if kind == "correlated" else None
     scene = scene if time is None else scene.with_(noise_correlation_time=time)
     motion = rsfstudy.simulate(scene, duration=5.1, engine="python")
-    values = 1.0 + 1e-3 * Path(5, 1, time).sample(0.25, 0, 22)
+    values = 1.0 + 1e-3 * UnitNoisePath(5, 1, time).compute_samples(0.25, 0, 22)
     expected = np.interp(motion.time, 0.25 * np.arange(22), values)
     np.testing.assert_allclose(motion.normal_stress_ratio, expected, atol=1e-9)
     # The load point moves steadily.
@@ -244,7 +252,7 @@ def test_noise_in_ruptures_with_mass():
     motion = rsfstudy.simulate(scene, duration=30.0, engine="python")
     assert scene.RUPTURE_REGIME in motion.regime.flag_meanings.split()
     assert (motion.regime == motion.regime.flag_meanings.split().index("inertial")).any()
-    values = 1e-4 * Path(0, 0).sample(0.25, 0, 122)
+    values = 1e-4 * UnitNoisePath(0, 0).compute_samples(0.25, 0, 122)
     expected = 3.0 + motion.time + np.interp(motion.time, 0.25 * np.arange(122), values) / 0.001
     np.testing.assert_allclose(motion.load_point_displacement, expected, atol=1e-5)
 

@@ -74,8 +74,7 @@ def dense(noise: NoiseModel) -> np.ndarray:
     seen = [correlations(AR3, 300), correlations(np.array([0.9]), 300)]
     sizes = np.concatenate(
         [
-            [noise.noise_level_standard_deviations[r.noise_process_index]]
-            * (r.stop_row - r.start_row)
+            [noise.relative_noise_levels[r.noise_process_index]] * (r.stop_row - r.start_row)
             for r in noise.sampling_runs
         ]
     )
@@ -98,7 +97,7 @@ def test_whitening_is_that_of_the_triangle_of_the_correlation_matrix(noise: Nois
     # The rounding error is multiplied by the condition number of 1e3.
     np.testing.assert_allclose(found, np.linalg.inv(triangle), atol=1e-11)
     exact = 2.0 * np.log(np.diag(triangle)).sum()
-    assert noise.log_determinant == pytest.approx(exact, abs=1e-10)
+    assert noise.correlation_log_determinant == pytest.approx(exact, abs=1e-10)
 
 
 @pytest.mark.parametrize("noise", [BOTH, CHANGING], ids=["apart", "one whose size changes"])
@@ -139,20 +138,23 @@ def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     of the estimated power at zero frequency.
     """
     one = NoiseModel((SamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
-    assert one.degrees_of_freedom_of_slow_noise == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
-    assert noises.build_white_noise_model(np.arange(500.0)).degrees_of_freedom_of_slow_noise == 500
+    assert one.low_frequency_noise_degrees_of_freedom == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
+    assert (
+        noises.build_white_noise_model(np.arange(500.0)).low_frequency_noise_degrees_of_freedom
+        == 500
+    )
     rng, logs = np.random.default_rng(7), []
     for _ in range(400):
         drawn = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=3_200))[200:]
         found = NoiseModel(
             (SamplingRun(0, 3_000, 0, 0, 0),),
-            np.array([noises._burg_coefficients([drawn], 3)]),
+            np.array([noises._estimate_burg_coefficients([drawn], 3)]),
             np.ones(1),
         )
         logs.append(math.log(np.var(drawn) / found.effective_sample_size))
     exact = NoiseModel(
         (SamplingRun(0, 3_000, 0, 0, 0),), np.array([partial(AR3)]), np.ones(1)
-    ).degrees_of_freedom_of_slow_noise
+    ).low_frequency_noise_degrees_of_freedom
     # The variance of 400 samples has a relative standard error of 1/14.
     assert 2.0 / np.var(logs) == pytest.approx(exact, rel=0.25)
 
@@ -165,9 +167,9 @@ def test_coefficients_are_recovered() -> None:
     rng = np.random.default_rng(3)
     long = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=50_000))
     # The standard errors are below 1/sqrt(n).
-    assert np.abs(noises._burg_coefficients([long], 3) - partial(AR3)).max() < 5.0 / math.sqrt(
-        50_000
-    )
+    assert np.abs(
+        noises._estimate_burg_coefficients([long], 3) - partial(AR3)
+    ).max() < 5.0 / math.sqrt(50_000)
     time = np.arange(400.0)
     jacobian = np.column_stack([np.ones(400), time, time**2, np.exp(-time / 60.0)])
     base = np.linalg.qr(jacobian)[0]
@@ -175,8 +177,10 @@ def test_coefficients_are_recovered() -> None:
     for _ in range(60):
         noise = lfilter([1.0], [1.0, -0.9], rng.normal(size=700))[300:]
         left = noise - base @ (base.T @ noise)
-        plain.append(noises._burg_coefficients([left], 1)[0])
-        reml.append(noises.fit_noise("ar1", time, left, jacobian).partial_autocorrelations[0, 0])
+        plain.append(noises._estimate_burg_coefficients([left], 1)[0])
+        reml.append(
+            noises.fit_noise_model("ar1", time, left, jacobian).partial_autocorrelations[0, 0]
+        )
     # The mean of 60 samples has a standard error of sqrt((1 - 0.81)/400/60) = 0.0028.
     assert abs(np.mean(reml) - 0.9) < 0.009
     assert np.mean(plain) < 0.885  # The fit has absorbed a part of the noise.
@@ -200,8 +204,8 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     slow = lfilter([1.0], [1.0, -0.5], rng.normal(size=600)) * math.sqrt(0.75)
     fast = lfilter([1.0], [1.0, -0.95], rng.normal(size=1_500))[600:] * math.sqrt(1 - 0.95**2)
     left = np.concatenate([slow, 3.0 * fast])
-    found = noises.fit_noise("ar1", time, left, np.ones((1_500, 1)))
-    assert [(*run[:2], run.row_count_since_clock_start) for run in found.sampling_runs] == [
+    found = noises.fit_noise_model("ar1", time, left, np.ones((1_500, 1)))
+    assert [(*run[:2], run.row_count_since_time_restart) for run in found.sampling_runs] == [
         (0, 600, 0),
         (600, 1_500, 600),
     ]
@@ -210,12 +214,10 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     )
     for number, exact in coefficients.items():
         assert found.partial_autocorrelations[number, 0] == pytest.approx(exact, abs=0.12)
-    for noise in (found, noises.fit_noise("white", time, left, np.ones((1_500, 1)))):
+    for noise in (found, noises.fit_noise_model("white", time, left, np.ones((1_500, 1)))):
         # 900 samples with a correlation of 0.95 contain 23 independent samples, which determine
         # the level to 15 %.
-        sizes = noise.noise_level_standard_deviations[
-            [run.noise_level_index for run in noise.sampling_runs]
-        ]
+        sizes = noise.relative_noise_levels[[run.noise_level_index for run in noise.sampling_runs]]
         assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.5)
 
 
@@ -241,8 +243,8 @@ def test_whiteness_is_that_of_ljung_and_box(order: int) -> None:
     lags = range(1, 20 + order + 1)
     seen = np.array([np.corrcoef(np.roll(left, k)[k:], left[k:])[0, 1] for k in lags])
     size = 300 * 302 * sum(r**2 / (300 - k) for r, k in zip(seen, lags, strict=True))
-    told = noises.ljung_box_p_value(left + 5.0, order)
-    assert told == pytest.approx(noises.ljung_box_p_value(left, order), rel=1e-9)
+    told = noises.compute_ljung_box_p_value(left + 5.0, order)
+    assert told == pytest.approx(noises.compute_ljung_box_p_value(left, order), rel=1e-9)
     # The means and variances of parts differ from the whole series by the effect of a few lags
     # in 300.
     assert chi2.isf(told, 20) == pytest.approx(size, rel=0.1)
@@ -253,10 +255,10 @@ def test_the_noise_level_may_change(rho: float) -> None:
     rng = np.random.default_rng(11)
     left = lfilter([1.0], [1.0, -rho], rng.normal(size=900))
     left[300:] *= 4.0
-    found = noises.fit_noise("ar", np.arange(900.0), left, np.ones((900, 1)))
-    assert len(found.noise_level_standard_deviations) == 2
+    found = noises.fit_noise_model("ar", np.arange(900.0), left, np.ones((900, 1)))
+    assert len(found.relative_noise_levels) == 2
     assert abs(found.sampling_runs[1].start_row - 300) < 30
-    assert found.noise_level_standard_deviations[1] == pytest.approx(4.0, rel=0.3)
+    assert found.relative_noise_levels[1] == pytest.approx(4.0, rel=0.3)
     # The local noise level determines the weights of the quiet rows.
     weights = found.whiten_columns(np.ones((900, 1)))[:, 0] ** 2
     assert weights[:250].sum() > 4.0 * weights[350:600].sum()

@@ -16,7 +16,7 @@ from rsfstudy.named_studies._critical_triggers import Triggers
 from rsfstudy import Scene
 from rsfstudy.critical_steps import critical_step
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.critical_steps.stability_after_step import (
     has_frictional_damping_only,
     is_neutrally_stable,
@@ -132,7 +132,9 @@ def test_either_side_of_a_fall(law, stress, dynamics, ratio, b_over_a, moves):
         return
     for side, reached in ((1.0 - 1e-4, False), (1.0 + 1e-4, True)):
         stepped = scene.with_(normal_stress_step=math.expm1(side * math.log1p(value)))
-        assert motion_reaches_norm(stepped, Integrator(Accuracy(1e-6, 200_000))) is reached
+        assert (
+            motion_reaches_instability_norm(stepped, Integrator(Accuracy(1e-6, 200_000))) is reached
+        )
 
 
 @pytest.mark.parametrize("dynamics", DYNAMICS, ids=str)
@@ -182,7 +184,7 @@ def test_normal_stress_that_is_imposed_is_constant_between_steps():
     assert may_have_closed_orbits(scene)
     assert not has_frictional_damping_only(Scene(alpha=0.5))
     stepped = scene.with_(normal_stress_step=0.25, stiffness_ratio=1.25)
-    after = stability.critical_stiffness(stepped, stepped.log_load_velocity)
+    after = stability.compute_critical_stiffness(stepped, stepped.log_load_velocity)
     assert after == pytest.approx(1.25 * scene.critical_stiffness, rel=1e-9)
     law = {"law": "perrin_rice_zheng"}
     assert is_neutrally_stable(stepped.with_(**law), 1e-6)

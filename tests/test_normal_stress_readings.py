@@ -14,7 +14,7 @@ from rsfstudy.named_studies._normal_stress_transient import NormalStressTransien
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.slider.stability import spring_response_to_normal_stress
+from rsfstudy.slider.stability import compute_spring_response_to_normal_stress
 from rsfstudy.status import Status
 
 LAWS = ("slip", "slowness")
@@ -52,7 +52,7 @@ def test_linear_theory_is_the_formula(law, velocity):
     a, b, stiffness, rate = scene.a, scene.b, scene.stiffness, math.log(velocity)
     mu, z = scene.mu_star + (a - b) * rate, 2j * math.pi / PERIOD / velocity
     form = stiffness * (mu + (mu - 0.3) * z) / (a * z * z + (stiffness - b + a) * z + stiffness)
-    ours = spring_response_to_normal_stress(scene, rate, 2.0 * math.pi / PERIOD)
+    ours = compute_spring_response_to_normal_stress(scene, rate, 2.0 * math.pi / PERIOD)
     assert ours == pytest.approx(form, rel=1e-11)
 
 
@@ -63,12 +63,12 @@ def test_waves_and_mass_resist():
         Scene(law="slip", **IMPOSED, **OSCILLATES, **more)
         for more in ({}, {"radiation_damping": 0.01}, HEAVY)
     )
-    base = spring_response_to_normal_stress(plain, 0.0, abs(z))
+    base = compute_spring_response_to_normal_stress(plain, 0.0, abs(z))
     stiffness = plain.stiffness
     above = stiffness * (plain.mu_star + (plain.mu_star - 0.3) * z)
     for scene, more in ((waves, 0.01 * z), (heavy, stiffness * 0.05**2 * z * z)):
         expected = above / (above / base + more * (1.0 + z))
-        ours = spring_response_to_normal_stress(scene, 0.0, abs(z))
+        ours = compute_spring_response_to_normal_stress(scene, 0.0, abs(z))
         assert ours == pytest.approx(expected, rel=1e-11)
 
 
@@ -89,7 +89,7 @@ def test_motions_tend_to_linear_theory_as_the_square_of_their_amplitude(fields):
     Without this deviation, both results agree to the requested accuracy.
     """
     scene = Scene(**{**OSCILLATES, **fields})
-    linear = spring_response_to_normal_stress(
+    linear = compute_spring_response_to_normal_stress(
         scene, scene.log_load_velocity, 2.0 * math.pi / PERIOD
     )
     large, small = (response(scene, amplitude) / linear - 1.0 for amplitude in (1e-3, 5e-4))

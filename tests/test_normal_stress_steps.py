@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 from study_runs import start_point
 
 from rsfstudy import Scene
-from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.initial_points import initial_point
+from rsfstudy.motion.initial_points import compute_initial_point
 from rsfstudy.motion.integrator import Integrator
 
 
@@ -41,7 +41,7 @@ def test_at_the_instant_of_a_step(step, alpha, inertia):
     assert point.normal_stress == ratio
     assert point.state == pytest.approx(-alpha * math.log(ratio), abs=1e-15)
     if inertia:
-        point = initial_point(scene)
+        point = compute_initial_point(scene)
         assert point.log_slip_rate == 0.0
         stress = ratio * (scene.mu_star - alpha * math.log(ratio)) - scene.mu_star
         assert point.frictional_stress == pytest.approx(stress, abs=1e-14)
@@ -79,4 +79,6 @@ def test_a_fall_of_normal_stress_triggers_beyond_its_closed_form(law, alpha):
     step = 1.0 / q - 1.0
     for share, reached in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
         stepped = scene.with_(normal_stress_step=share * step)
-        assert motion_reaches_norm(stepped, Integrator(Accuracy(1e-9, 100_000))) is reached
+        assert (
+            motion_reaches_instability_norm(stepped, Integrator(Accuracy(1e-9, 100_000))) is reached
+        )

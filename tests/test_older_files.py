@@ -20,9 +20,9 @@ from rsfstudy.former_data_names import rename_former_variables
 from rsfstudy.reporting.fit_tables import FitTable
 from rsfstudy.status import Status
 from rsfstudy.storage import schema
-from rsfstudy.storage.declarations import parse_declaration
+from rsfstudy.storage.declarations import parse_study_declaration
 from rsfstudy.study import study_loader
-from rsfstudy.study.verdict_table import VerdictTable
+from rsfstudy.study.verdict_table import ClaimVerdictTable
 
 #: Files written by rsfstudy 0.1.0, before files contained a layout number: a study with its
 #: journal and as a Zarr store, a named study narrowed with --set, a study with failed cells, and
@@ -64,7 +64,10 @@ def test_a_range_was_a_spread():
 
 def test_they_hold_what_they_held(older):
     narrowed = rsfstudy.open(older / "rate_step_boundary.nc")
-    assert schema.read_declaration(narrowed).overrides == {"b_over_a": [2.0, 3.0], "alpha": 0.4}
+    assert schema.read_study_declaration(narrowed).overrides == {
+        "b_over_a": [2.0, 3.0],
+        "alpha": 0.4,
+    }
     assert set(rsfstudy.check(narrowed).verdict) == {"not applicable", "reproduced"}
     failed = rsfstudy.open(older / "displacement_boundary.nc")
     assert (failed.status == int(Status.WORK_BUDGET_SPENT)).any()
@@ -100,7 +103,8 @@ def test_a_run_goes_on(older, tmp_path, monkeypatch):
     with contextlib.closing(sqlite3.connect(journal)) as db, db:
         (text,) = db.execute("SELECT json FROM fingerprint").fetchone()
         now = json.dumps(
-            {**json.loads(text), **provenance.run_fingerprint(study, [study.base])}, sort_keys=True
+            {**json.loads(text), **provenance.collect_run_fingerprint(study, [study.base])},
+            sort_keys=True,
         )
         db.execute("UPDATE fingerprint SET json = ?", (now,))
     monkeypatch.setattr("rsfstudy.execution.cell_computation.compute_cell", None)
@@ -171,7 +175,9 @@ def test_declarations_of_older_files_are_understood():
     for former, new in {"minus": "baseline", "minus_variable": "baseline_variable",
                         "because": "difference_reason"}.items():  # fmt: skip
         older["claims"][0][former] = older["claims"][0].pop(new)
-    assert parse_declaration(older) == parse_declaration(json.loads(json.dumps(declared)))
+    assert parse_study_declaration(older) == parse_study_declaration(
+        json.loads(json.dumps(declared))
+    )
     assert older["claims"][0]["because"] == "a misprint"
 
 
@@ -183,11 +189,11 @@ def test_claims_on_intervals_of_sobol_indices_are_understood():
     for claim in renamed:
         claim["variable"] = claim["variable"].replace("_ci_", "_")
     assert renamed
-    assert parse_declaration(older) == parse_declaration(current)
+    assert parse_study_declaration(older) == parse_study_declaration(current)
 
 
 def test_former_columns_of_tables_are_selected_with_a_warning():
-    verdicts = VerdictTable({"id": ["C1"], "computed": [2.0], "verdict_changed": [True]})
+    verdicts = ClaimVerdictTable({"id": ["C1"], "computed": [2.0], "verdict_changed": [True]})
     with pytest.warns(DeprecationWarning, match="'ours' of the table is now called 'computed'"):
         assert verdicts["ours"].tolist() == [2.0]
     with pytest.warns(DeprecationWarning, match="'moved'.*'verdict_changed'"):

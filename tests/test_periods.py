@@ -9,17 +9,20 @@ from rsfstudy.named_studies._bifurcation import Bifurcation
 from rsfstudy import Scene
 from rsfstudy.limit_cycles import return_map
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.limit_cycles.limit_cycle_search import LimitCycleSearch, follow_to_periodic_orbit
+from rsfstudy.limit_cycles.limit_cycle_search import (
+    LimitCycleSearch,
+    follow_motion_to_periodic_orbit,
+)
 from rsfstudy.limit_cycles.return_map import (
     ReturnMap,
-    multiply_cycle_derivatives,
-    section_coordinates_at_point,
+    extract_section_coordinates,
+    multiply_return_map_derivatives,
 )
-from rsfstudy.limit_cycles.stick_slip_cycles import Cycle
+from rsfstudy.limit_cycles.stick_slip_cycles import StickSlipCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.slider.stability import linear_growth_rates
+from rsfstudy.slider.stability import compute_linear_growth_rates
 from rsfstudy.status import Status
 
 #: Slow oscillations of two slip states, started close to their attractor (Gu et al. 1984).
@@ -42,7 +45,7 @@ def quick(rtol: float) -> Accuracy:
 
 
 def came_to(scene: Scene, events: int = 64, rtol: float = 1e-7, **how):
-    return follow_to_periodic_orbit(scene, Integrator(quick(rtol)), events, **how)
+    return follow_motion_to_periodic_orbit(scene, Integrator(quick(rtol)), events, **how)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -51,13 +54,15 @@ def test_the_multiplier_of_one_state_is_the_slope_of_its_return_map(law):
     scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
     integrator = Integrator(Accuracy(1e-8, 2_000_000))
     approach = LimitCycleSearch(scene, integrator)
-    assert approach.follow_until_converged(300)
-    orbit = follow_to_periodic_orbit(scene, integrator, 64).orbit
-    assert orbit.period == 1
+    assert approach.follow_cycles_until_converged(300)
+    orbit = follow_motion_to_periodic_orbit(scene, integrator, 64).approached_periodic_orbit
+    assert orbit.period_in_cycles == 1
     multiplier, forgotten = orbit.floquet_multipliers
     assert multiplier.imag == 0.0
     assert abs(forgotten) < 1e-12
-    assert approach.orbit.floquet_multipliers[0].real == pytest.approx(multiplier.real, abs=1e-3)
+    assert approach.last_cycle_as_periodic_orbit.floquet_multipliers[0].real == pytest.approx(
+        multiplier.real, abs=1e-3
+    )
 
 
 def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
@@ -68,13 +73,13 @@ def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
     """
     for off in (2e-3, 5e-4):
         scene = slow(1.0 - off, displacement_step=0.02 + 14.0 * math.sqrt(off))
-        fastest = linear_growth_rates(scene, 0.0)[0]
+        fastest = compute_linear_growth_rates(scene, 0.0)[0]
         expected = math.exp(-2.0 * fastest.real * 2.0 * math.pi / abs(fastest.imag))
         found = Bifurcation(transient=60, events=4)(scene, quick(1e-8)).values
         assert 1.0 - found["floquet_multiplier"] == pytest.approx(1.0 - expected, rel=40.0 * off)
 
 
-def followed(scene: Scene, count: int) -> list[Cycle]:
+def followed(scene: Scene, count: int) -> list[StickSlipCycle]:
     return came_to(scene, count, 1e-9, follow_all_cycles=True).cycles
 
 
@@ -87,11 +92,11 @@ def test_periods(ratio, period):
     found = LimitCycle(phases=50)(scene, quick(1e-7))
     assert found.status is Status.OK
     assert found.values["period_events"] == period
-    orbit = came_to(scene).orbit.orbit_starting_at_largest_event
-    assert orbit.period == period
+    orbit = came_to(scene).approached_periodic_orbit.orbit_starting_at_largest_event
+    assert orbit.period_in_cycles == period
     assert orbit.is_attracting
     begin, end = map(
-        section_coordinates_at_point, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point)
+        extract_section_coordinates, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point)
     )
     assert np.abs(end - begin).max() < 1e-6 * scene.a
     # The orbit covers the whole period, and the outputs belong to its largest event.
@@ -118,11 +123,11 @@ def test_periods(ratio, period):
 
 
 def test_multipliers_of_a_period_are_those_of_all_its_events():
-    orbit = came_to(slow(0.856)).orbit
-    whole = multiply_cycle_derivatives(orbit.cycle_derivatives)
+    orbit = came_to(slow(0.856)).approached_periodic_orbit
+    whole = multiply_return_map_derivatives(orbit.return_map_derivatives_per_cycle)
     size = len(whole)
     assert whole == pytest.approx(
-        np.linalg.multi_dot([e[:size] for e in orbit.cycle_derivatives[::-1]])
+        np.linalg.multi_dot([e[:size] for e in orbit.return_map_derivatives_per_cycle[::-1]])
     )
     turned = orbit.orbit_starting_at_largest_event.floquet_multipliers
     assert turned[0] == pytest.approx(orbit.floquet_multipliers[0], rel=1e-5)
@@ -145,7 +150,7 @@ def test_a_multiplier_passes_minus_one_where_the_period_doubles():
     assert after["peak_spread"] == pytest.approx(np.ptp(peaks), abs=1e-12)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_what_never_repeats_itself_says_so(engine):
     accuracy = Accuracy(1e-6, engine=engine)
     cycle = LimitCycle(phases=2)(slow(0.853), accuracy)
@@ -187,8 +192,10 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     monkeypatch.setattr(return_map, "DIFFERENCE_STEP_OVER_LOG_RATE_RANGE", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:
-        begin = section_coordinates_at_point(cycle.start_point)
-        (slopes,) = by.compute_cycle_derivatives(begin, 1, scene.a * cycle.log_slip_rate_range)
+        begin = extract_section_coordinates(cycle.start_point)
+        (slopes,) = by.compute_return_map_derivatives_per_cycle(
+            begin, 1, scene.a * cycle.log_slip_rate_range
+        )
         direction = slopes[: len(begin)] @ direction / np.linalg.norm(direction)
         grown.append(math.log(np.linalg.norm(direction)))
     expected = np.mean(grown[transient:])

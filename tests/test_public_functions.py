@@ -29,7 +29,7 @@ from rsfstudy import Axis, Rig, Scene, Study, read_record
 from rsfstudy.cli import command_line
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.fitting.record import Record
-from rsfstudy.referee.problem_files import shipped_problem_files
+from rsfstudy.referee.problem_files import find_shipped_problem_files
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.part_registry import SCENE_FIELD_NAMES
 from rsfstudy.storage import cell_journal
@@ -306,7 +306,7 @@ def commands(place: Path) -> dict[str, list[str]]:
         "events": [str(place / "record.csv")],
         "healing": [str(PAGES / "holds.csv")],
         "problems": ["referee"],
-        "verify": [str(shipped_problem_files()[19].with_suffix(".csv"))],
+        "verify": [str(find_shipped_problem_files()[19].with_suffix(".csv"))],
     }
 
 
@@ -376,7 +376,7 @@ def test_a_journal_of_other_things_is_refused(change, place, tmp_path):
     with contextlib.closing(sqlite3.connect(kept)) as db, db:
         db.executescript(change)
     answered(lambda: run(LATTICE, output=tmp_path))
-    answered(lambda: cell_journal.CellTimings.read(kept))
+    answered(lambda: cell_journal.CellWallTimes.read_from_journal(kept))
 
 
 def test_a_store_with_a_link_is_refused(tmp_path):

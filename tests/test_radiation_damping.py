@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.equations import equations_between_ruptures
+from rsfstudy.slider.equations import build_equations_between_ruptures
 from rsfstudy.slider.friction import build_friction_relation
 
 
@@ -27,7 +27,9 @@ def test_friction_and_radiation_balance_the_spring(
     damping = math.exp(log_damping)
     scene = Scene(normal_stress="constant") if constant else Scene(alpha=alpha)
     scene, strength = scene.with_(radiation_damping=damping), build_friction_relation(scene)
-    point = equations_between_ruptures(scene, with_time=False).evaluate_point((spring_stress, psi))
+    point = build_equations_between_ruptures(scene, with_time=False).evaluate_motion_point(
+        (spring_stress, psi)
+    )
     x, friction = point.log_slip_rate, point.frictional_stress
     # Rounding errors of the stresses, and of x times the derivative of the radiated stress.
     radiated = damping * math.expm1(x)

@@ -13,7 +13,7 @@ from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
 from rsfstudy.motion.integrator import Integrator
 
@@ -25,7 +25,7 @@ SLIDERS = {
 RAMP = {"normal_stress_ramp": 0.1, "ramp_duration": 4.0}
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("over", [0.3, 1.0, 1.7])
 def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(over, engine):
     """The end of a ramp is as accurate as the end of a step.

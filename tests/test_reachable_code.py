@@ -17,13 +17,13 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import DataError
 from rsfstudy.execution import cell_computation, provenance
 from rsfstudy.execution.cell_plan import compute_cell_key
-from rsfstudy.execution.module_graph import ModuleGraph
+from rsfstudy.execution.module_graph import ModuleImportGraph
 from rsfstudy.measures import CriticalStep, Elasticities, LimitCycle, LinearStability
 from rsfstudy.slider import part_registry
 from rsfstudy.storage import declarations, fingerprints
 
 PACKAGE = Path(rsfstudy.__file__).parent
-SOURCES = provenance.read_physics_sources(PACKAGE)
+SOURCES = provenance.read_physics_source_files(PACKAGE)
 SLIP = Scene(law="slip", normal_stress="constant", b_over_a=1.5)
 OPTIONS = {"workers": 0, "progress": False, "rtol": 1e-4}
 
@@ -36,8 +36,11 @@ def edit(monkeypatch, path):
     """Change the last function of one source file, as if it had been changed before the import."""
     head, found, tail = SOURCES[path].rpartition(b"    return ")
     changed = {path: head + found + b"not " + tail}
-    assert ModuleGraph(changed).digests() != ModuleGraph({path: SOURCES[path]}).digests()
-    monkeypatch.setattr(provenance, "_modules_at_import", ModuleGraph({**SOURCES, **changed}))
+    assert (
+        ModuleImportGraph(changed).compute_digests()
+        != ModuleImportGraph({path: SOURCES[path]}).compute_digests()
+    )
+    monkeypatch.setattr(provenance, "_modules_at_import", ModuleImportGraph({**SOURCES, **changed}))
 
 
 def study_of_critical_steps(*laws):
@@ -78,7 +81,7 @@ def test_a_longer_axis_adds_the_modules_of_its_laws(tmp_path, monkeypatch):
     stored = json.loads(found.attrs["provenance"])["fingerprint"]["physics"]
     assert {"slider.laws.slip", "slider.laws.slowness"} <= set(stored)
     resume(study_of_critical_steps("slip"), tmp_path, monkeypatch)  # It keeps both modules.
-    monkeypatch.setattr(provenance, "_modules_at_import", ModuleGraph(SOURCES))
+    monkeypatch.setattr(provenance, "_modules_at_import", ModuleImportGraph(SOURCES))
     with pytest.raises(DataError, match=r"physics \(slider.laws.slowness\)"):
         rsfstudy.run(both, output=tmp_path, **OPTIONS)
     with closing(sqlite3.connect(tmp_path / "steps.cells.sqlite")) as db:
@@ -116,7 +119,7 @@ def test_a_measure_of_a_user_may_reach_all_modules():
     class Own(LinearStability):
         """Measure that is defined outside rsfstudy."""
 
-    assert reach(Own(), SLIP) == ModuleGraph(SOURCES).digests()
+    assert reach(Own(), SLIP) == ModuleImportGraph(SOURCES).compute_digests()
 
 
 FILES = {
@@ -154,7 +157,7 @@ FILES = {
 )
 def test_imports_are_found_in_the_sources(source, modules):
     texts = {path: text.encode() for path, text in {**FILES, "motion/m.py": source}.items()}
-    found = ModuleGraph(texts).digests(["rsfstudy.motion.m"])
+    found = ModuleImportGraph(texts).compute_digests(["rsfstudy.motion.m"])
     assert found.keys() == {"motion.m", *modules.split()}
 
 
@@ -260,12 +263,12 @@ def test_a_later_part_does_not_change_the_keys_of_other_scenes():
 
 def test_a_later_slot_does_not_change_the_keys_of_other_scenes(monkeypatch):
     scene, dilatant = Scene(), Scene(fluid="dilatant")
-    monkeypatch.setitem(part_registry.OMITTED_DEFAULTS, "fluid", "drained")
+    monkeypatch.setitem(part_registry.DEFAULTS_OMITTED_FROM_STORED_SCENES, "fluid", "drained")
     assert "fluid" not in scene.stored_fields()
     assert "fluid" not in scene.as_dict()
     assert dilatant.as_dict()["fluid"] == "dilatant"
     assert dilatant.stored_fields()["fluid"] == "dilatant"
     assert compute_cell_key(scene, LimitCycle()) != compute_cell_key(dilatant, LimitCycle())
     for each in (scene, dilatant):
-        assert declarations.build_scene_from_stored(each.stored_fields()) == each
+        assert declarations.build_scene_from_stored_fields(each.stored_fields()) == each
     assert dilatant.with_(fluid="drained") == scene

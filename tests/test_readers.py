@@ -26,7 +26,7 @@ from rsfstudy.errors import CallError, DataError, InvalidValue
 from rsfstudy.rig import readers
 from rsfstudy.rig.columns import Column
 from rsfstudy.rig.readers import spreadsheets, text_layout
-from rsfstudy.rig.readers.source import Source, Table
+from rsfstudy.rig.readers.source import SourceTable, TableSource
 
 ROWS = 40
 TIME = 0.25 * np.arange(ROWS)
@@ -165,7 +165,9 @@ def test_units_that_contradict_the_file_are_refused(tmp_path: Path) -> None:
 # ---- binary formats ------------------------------------------------------------------------------
 @pytest.mark.parametrize("library", ["openpyxl", "python_calamine"])
 def test_workbooks(library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(spreadsheets, "_ENGINES", {library: spreadsheets._ENGINES[library]})
+    monkeypatch.setattr(
+        spreadsheets, "_ENGINES", {library: spreadsheets._PANDAS_ENGINE_BY_LIBRARY[library]}
+    )
     path = tmp_path / "run.xlsx"
     frame = pd.DataFrame(dict(zip(HEADINGS, DATA.values(), strict=True)))
     with pd.ExcelWriter(path, engine="openpyxl") as book:
@@ -308,12 +310,14 @@ def test_datasets_and_frames(tmp_path: Path) -> None:
 def test_a_new_format_is_one_pair_of_functions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def read_raw(source: Source) -> Table:
-        values = np.frombuffer(source.read_bytes()[4:]).reshape(4, -1)
-        return Table(HEADINGS, str(source.origin), lambda n, _name: Column(values[n], ""))
+    def read_raw(source: TableSource) -> SourceTable:
+        values = np.frombuffer(source.read_all_bytes()[4:]).reshape(4, -1)
+        return SourceTable(
+            HEADINGS, str(source.path_or_object), lambda n, _name: Column(values[n], "")
+        )
 
     pair = (lambda source: source.signature.startswith(b"raw\0"), read_raw)
-    monkeypatch.setattr(readers, "READERS", [pair, *readers.READERS])
+    monkeypatch.setattr(readers, "READERS", [pair, *readers.FORMAT_TESTS_AND_READERS])
     (tmp_path / "run.raw").write_bytes(b"raw\0" + np.array([*DATA.values()]).tobytes())
     check(tmp_path / "run.raw")
 
@@ -533,5 +537,7 @@ def test_brackets_of_a_header_are_counted_once_per_word() -> None:
             counted += 1
             return str.count(self, *args)
 
-    assert text_layout._merge_brackets([Word(word) for word in words]) == [" ".join(words)]
+    assert text_layout._append_bracketed_units_to_words([Word(word) for word in words]) == [
+        " ".join(words)
+    ]
     assert counted == 2 * len(words)

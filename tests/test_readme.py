@@ -22,7 +22,7 @@ from rsfstudy import measures, reductions
 from rsfstudy.cli.command_line import cli
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.slider import laws
-from rsfstudy.slider.parts import field_names
+from rsfstudy.slider.parts import list_part_field_names
 
 TEXT = "\n".join(file.read_text() for file in FILES)
 #: Tutorials, whose code blocks depend on the previous blocks of the page.
@@ -207,7 +207,11 @@ def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("base", "example", "written"),
     [
-        (laws.Law, laws.BUILT_IN_PARTS["slowness"], ("evolution", "parameter_values", "check")),
+        (
+            laws.Law,
+            laws.BUILT_IN_LAW_CLASS_BY_NAME["slowness"],
+            ("evolution", "parameter_values", "check"),
+        ),
         (measures.Measure, CriticalStep, ("compute", "error_scales")),
         (reductions.Reduction, reductions.Reduction, ("__call__", "derivatives")),
     ],
@@ -269,12 +273,14 @@ def test_every_study_is_listed():
 
 
 def test_every_law_is_listed():
-    for name, law in laws.BUILT_IN_PARTS.items():
+    for name, law in laws.BUILT_IN_LAW_CLASS_BY_NAME.items():
         row = re.search(rf"^\| (?:`\w+`, )*`{name}`.*$", TEXT, re.MULTILINE)
         assert row, name
-        own = set(field_names(law)) - set(field_names(laws.Law))
+        own = set(list_part_field_names(law)) - set(list_part_field_names(laws.Law))
         assert all(f"`{field}`" in row[0] for field in own)
-    assert all(f"`{field}`" in TEXT for field in field_names(laws.Law) if field != "b_over_a")
+    assert all(
+        f"`{field}`" in TEXT for field in list_part_field_names(laws.Law) if field != "b_over_a"
+    )
 
 
 def test_the_table_of_zeta_is_ours(tmp_path_factory):

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene, history, simulate
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 
 #: A pressure ramp up, a constant pressure, and a ramp down to a negative value.
 TIME, PRESSURE = np.array([0.0, 4.0, 7.0, 12.0]), np.array([0.0, 0.2, 0.2, -0.1])
@@ -24,7 +24,7 @@ def at_times(engine=COMPILED, **fields):
     return simulate(Scene(**FAULT, **fields), times=AT, rtol=1e-9, engine=engine)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_pressure_diffuses_into_the_fault(engine):
     """Without dilatancy, the pressure has a closed form.
 
@@ -46,7 +46,7 @@ def test_pressure_diffuses_into_the_fault(engine):
     assert np.allclose(motion.friction_coefficient, read, rtol=0.0, atol=1e-8)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_all_of_it_by_other_equations(engine):
     """Stress and pressure agree with an independent integration in time.
 

@@ -14,11 +14,11 @@ import pytest
 from rsfstudy import Scene, protocol, simulate
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import Event, EventKind
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.recorded_motion_readings import resample_motion_along_path
-from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
+from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, Recording
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
 
@@ -55,7 +55,7 @@ def recorded(scene: Scene, engine: str, times: np.ndarray, until: float = math.i
     motion = integrator.follow(scene, with_time=True, until=until, recording=recording)
     for event in motion:
         events.append(event)
-        if event.kind is EventKind.SAMPLED and math.isinf(until):
+        if event.kind is EventKind.ALL_SAMPLES_RECORDED and math.isinf(until):
             break
     return recording.as_table(scene), events
 
@@ -72,7 +72,7 @@ def row_of(scene: Scene, event: Event) -> list[float]:
     return [event.slip, log_slip_rate, *stresses, point.state, point.apparent_friction]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("name", SCENES)
 def test_values_are_those_of_motions_that_end_there(name, engine):
     """Samples agree with motions that end at the same times.
@@ -83,8 +83,8 @@ def test_values_are_those_of_motions_that_end_there(name, engine):
     scene = SCENES[name]
     table, events = recorded(scene, engine, TIMES, until=15.0)
     assert table[:, 0].tolist() == TIMES.tolist()
-    assert [event.kind for event in events].count(EventKind.SAMPLED) == 1
-    assert [event.kind for event in events[-2:]] == [EventKind.SAMPLED, EventKind.END]
+    assert [event.kind for event in events].count(EventKind.ALL_SAMPLES_RECORDED) == 1
+    assert [event.kind for event in events[-2:]] == [EventKind.ALL_SAMPLES_RECORDED, EventKind.END]
     for time, row in zip(TIMES[1:], table[1:], strict=True):
         integrator = Integrator(Accuracy(RTOL, 10**6, engine=engine))
         *_, end = integrator.follow(scene, with_time=True, until=time)
@@ -96,14 +96,15 @@ def test_values_are_those_of_motions_that_end_there(name, engine):
         scales = [1.0 + scene.a / scene.stiffness, 1.0, *[scene.a] * (len(expected) - 2)]
         apart = (
             np.abs(
-                [*row[1 : len(RECORDED_VARIABLES)], *row[FIRST_STATE_COLUMN:]] - np.array(expected)
+                [*row[1 : len(RECORDED_VARIABLE_NAMES)], *row[FIRST_STATE_COLUMN:]]
+                - np.array(expected)
             )
             / scales
         )
         assert apart.max() < 30.0 * RTOL, (time, apart)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_the_end_of_a_segment_is_recorded_and_not_the_beginning_of_the_next(engine):
     """A sample at a boundary belongs to the earlier segment.
 
@@ -112,8 +113,10 @@ def test_the_end_of_a_segment_is_recorded_and_not_the_beginning_of_the_next(engi
     """
     scene = SCENES["protocol"]
     table, events = recorded(scene, engine, np.array([8.0, 8.0, 8.0 + 1e-12, 8.5]))
-    (begun,) = (event for event in events if event.kind is EventKind.SEGMENT and event.time == 8.0)
-    spring_stress = table[:, RECORDED_VARIABLES.index("shear_stress")] - scene.mu_star
+    (begun,) = (
+        event for event in events if event.kind is EventKind.SEGMENT_START and event.time == 8.0
+    )
+    spring_stress = table[:, RECORDED_VARIABLE_NAMES.index("shear_stress")] - scene.mu_star
     jump = -0.4 * scene.stiffness
     assert (
         spring_stress[0]
@@ -121,10 +124,10 @@ def test_the_end_of_a_segment_is_recorded_and_not_the_beginning_of_the_next(engi
         == pytest.approx(begun.point.spring_stress - jump, rel=1e-12)
     )
     assert spring_stress[2] == pytest.approx(begun.point.spring_stress, abs=1e-9 * scene.a)
-    assert events[-1].kind is EventKind.SAMPLED
+    assert events[-1].kind is EventKind.ALL_SAMPLES_RECORDED
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_what_lies_beyond_the_end_is_not_recorded(engine):
     table, events = recorded(SCENES["one segment"], engine, np.array([1.0, 2.0, 3.0]), until=2.0)
     assert table[:, 0].tolist() == [1.0, 2.0]
@@ -148,11 +151,11 @@ def exactly(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
     recording = Recording(sample_times=times)
     integrator = Integrator(Accuracy(1e-11, 10**7, engine=COMPILED))
     list(integrator.follow(scene, until=float(times[-1]), recording=recording))
-    return dict(zip(RECORDED_VARIABLES, recording.as_table(scene).T, strict=False))
+    return dict(zip(RECORDED_VARIABLE_NAMES, recording.as_table(scene).T, strict=False))
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9])
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("stiff", [3.0, 17.0])
 def test_rows_between_the_steps_of_a_stiff_slider(stiff, engine, rtol):
     """Rows within the steps of a stiff slider meet the tolerance.
@@ -215,7 +218,7 @@ def test_points_along_a_path_are_those_of_the_compiled_loop():
     for event in Integrator(Accuracy(1e-6, 20_000)).follow(
         scene, with_time=True, recording=recording
     ):
-        changes += event.kind is EventKind.REGIME
+        changes += event.kind is EventKind.REGIME_CHANGE
         if changes == 2:
             break
     table = recording.as_table(scene)

@@ -20,32 +20,36 @@ from study_runs import call_main
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.referee import external_answers, reference_answers
 from rsfstudy.referee.answer_comparison import (
     DEFAULT_REQUIRED_DIGITS,
     AnswerComparison,
     compare_answers,
-    known_answer,
+    read_or_compute_known_answer,
 )
-from rsfstudy.referee.problem_files import BenchmarkProblem, read_problem, shipped_problem_files
+from rsfstudy.referee.problem_files import (
+    BenchmarkProblem,
+    find_shipped_problem_files,
+    read_problem,
+)
 
-NUMBERS = sorted(shipped_problem_files())
+NUMBERS = sorted(find_shipped_problem_files())
 RSFMODEL = Path(__file__).with_name("rsfmodel")
 
 
 def of(number: int) -> BenchmarkProblem:
-    return read_problem(shipped_problem_files()[number])
+    return read_problem(find_shipped_problem_files()[number])
 
 
 def answer_of(number: int) -> list[dict[str, str]]:
-    with shipped_problem_files()[number].with_suffix(".csv").open() as file:
+    with find_shipped_problem_files()[number].with_suffix(".csv").open() as file:
         return [{k.split()[0]: v for k, v in row.items()} for row in csv.DictReader(file)]
 
 
 @functools.cache
 def second_way(number: int) -> list[dict]:
-    return second_way_rows(read_stated_problem(shipped_problem_files()[number]))
+    return second_way_rows(read_stated_problem(find_shipped_problem_files()[number]))
 
 
 # ---- answers -------------------------------------------------------------------------------------
@@ -58,7 +62,7 @@ def test_answers_are_those_of_a_second_way(number):
     problem, rows, others = of(number), answer_of(number), second_way(number)
     assert (
         [*rows[0]]
-        == columns(read_stated_problem(shipped_problem_files()[number]))
+        == columns(read_stated_problem(find_shipped_problem_files()[number]))
         == [*problem.column_names]
     )
     for name in problem.quantities:
@@ -77,7 +81,7 @@ def test_answers_are_those_of_a_second_way(number):
 def test_files_of_problems_hold_all_that_they_are_asked_for(number):
     problem = of(number)
     assert problem.digits == (11 if number == 24 else 12)
-    text = shipped_problem_files()[number].read_text()
+    text = find_shipped_problem_files()[number].read_text()
     assert problem.equations
     assert problem.conventions
     assert [f"{name} ({UNITS[name]})" for name in problem.column_names] == problem.column_headings
@@ -94,7 +98,9 @@ def told_of(
 
 
 def digits_of_ours(number: int, rtol: float, engine: str) -> AnswerComparison:
-    problem, answer = known_answer(of(number), shipped_problem_files()[number].with_suffix(".csv"))
+    problem, answer = read_or_compute_known_answer(
+        of(number), find_shipped_problem_files()[number].with_suffix(".csv")
+    )
     table = reference_answers.compute_answer(problem, Accuracy(rtol, 5_000_000, engine=engine))
     return compare_answers(problem, answer, told_of(table), 1.0)
 
@@ -109,7 +115,7 @@ def test_ours_has_the_digits_it_promises(number, rtol):
     assert digits_of_ours(number, rtol, COMPILED).agreeing_digits >= -math.log10(4.0 * rtol)
 
 
-@pytest.mark.parametrize("engine", sorted({*ENGINES} - {COMPILED}))
+@pytest.mark.parametrize("engine", sorted({*ENGINE_NAMES} - {COMPILED}))
 @pytest.mark.parametrize("number", [4, 12, 14, 17, 20])
 def test_every_engine_does(engine, number):
     for rtol in (1e-5, 1e-8):
@@ -206,7 +212,9 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
         other = replace(problem, parameters={**problem.parameters, **changes})
     table = reference_answers.compute_answer(other, Accuracy(1e-8, engine=COMPILED))
     found = compare_answers(
-        *known_answer(problem, shipped_problem_files()[number].with_suffix(".csv")),
+        *read_or_compute_known_answer(
+            problem, find_shipped_problem_files()[number].with_suffix(".csv")
+        ),
         told_of(table),
         DEFAULT_REQUIRED_DIGITS,
     )
@@ -318,7 +326,9 @@ def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_pat
     found = external_answers.read_external_answer(
         write(tmp_path / "mine.csv", header, columns), problem
     )
-    answer = known_answer(problem, shipped_problem_files()[number].with_suffix(".csv"))
+    answer = read_or_compute_known_answer(
+        problem, find_shipped_problem_files()[number].with_suffix(".csv")
+    )
     assert compare_answers(*answer, found, DEFAULT_REQUIRED_DIGITS).agreeing_digits > 11.0
 
 
@@ -420,7 +430,7 @@ STRESSED = _UNDAMPED.replace("mu_star", "alpha = 0.2\nmu_star") + 'normal_stress
 
 
 @pytest.mark.parametrize(
-    "text", [STEP, TWO_STATES, NAGATA, STRESSED, shipped_problem_files()[14].read_text()]
+    "text", [STEP, TWO_STATES, NAGATA, STRESSED, find_shipped_problem_files()[14].read_text()]
 )
 def test_a_problem_of_ones_own(text, tmp_path):
     """A user-defined problem agrees with an independent method in SI units."""

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 import rsfstudy
-from rsfstudy.study import study_names
+from rsfstudy.study import list_study_names
 
 ROOT = Path(rsfstudy.__file__).parents[1]
 PAGES = ROOT / "studies" / "pages"
@@ -91,7 +91,7 @@ def test_the_workflow_runs_existing_scripts_and_studies():
     studies = re.findall(r"rsfstudy (?:run|check) (\w+)", text)
     studies += re.search(r"for study in ([\w ]+);", package)[1].split()
     assert len(studies) >= 6
-    assert set(studies) <= set(study_names())
+    assert set(studies) <= set(list_study_names())
     for command in ("-m build", 'twine" check --strict', "rsfstudy check", 'pip" check'):
         assert command in package
 

@@ -91,7 +91,9 @@ def test_tables_are_used():
     with pytest.warns(DeprecationWarning, match="'reading' of MotionPoint is now"):
         assert maximum("reading").quantity == "apparent_friction"
     with pytest.warns(DeprecationWarning, match="of maximum\\(\\) is now") as caught:
-        assert maximum(of="spring_stress", waits=True) == maximum("spring_stress", may_defer=True)
+        assert maximum(of="spring_stress", waits=True) == maximum(
+            "spring_stress", may_report_later=True
+        )
     assert {warning.filename for warning in caught} == {__file__}
     with pytest.warns(DeprecationWarning, match="'stated' of Record\\(\\) is now"):
         assert (

@@ -192,7 +192,7 @@ def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_pat
         in text
     )
     with plots.style_context():
-        wide = f"--inches: {_size.figure_size(2, 1)[0]:.3g}"
+        wide = f"--inches: {_size.compute_figure_size_in_inches(2, 1)[0]:.3g}"
     assert [about["style"] for about in Page(text).all("img")] == [wide] * 3
 
 

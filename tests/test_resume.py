@@ -331,7 +331,7 @@ def test_other_versions_are_not_mixed(name, tmp_path, monkeypatch):
     from rsfstudy.execution import provenance
 
     run(output=tmp_path)
-    other = {**provenance.code_fingerprint(), name: "other"}
+    other = {**provenance.collect_code_fingerprint(), name: "other"}
     monkeypatch.setattr(provenance, "code_fingerprint", lambda *_used: other)
     with pytest.raises(DataError, match=f"{name}: .* in the journal, other in this run"):
         run(output=tmp_path)

@@ -9,7 +9,7 @@ from rsfstudy import Scene, history, protocol, simulate
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import EventKind, maximum, minimum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses._motion_readings import choose_friction_quantity_for_events
@@ -78,7 +78,7 @@ def test_steady_friction_stays_positive(stress, load):
     if stress == CONSTANT:
         # The weakening of the arcsinh form contains a factor of tanh(mu_ss/a).
         weakens = (scene.b - scene.a) * math.tanh(exact / scene.a)
-        assert stability.critical_stiffness(scene, math.log(load)) == pytest.approx(
+        assert stability.compute_critical_stiffness(scene, math.log(load)) == pytest.approx(
             weakens, rel=1e-9
         )
 
@@ -101,7 +101,7 @@ def unloaded(time, back):
     return a * np.log((rests - ratio * other) / (1.0 - ratio))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("of", ["displacement", "velocity", "protocol"])
 def test_a_load_point_that_moves_back_unloads_and_reverses(of, engine):
     """The stress agrees with the closed form while slip reverses.

@@ -12,7 +12,7 @@ from study_runs import run, run_command, study_of
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene, Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles.limit_cycle import SLIP_MODES, LimitCycle
+from rsfstudy.limit_cycles.limit_cycle import SLIP_MODE_NAMES, LimitCycle
 from rsfstudy.reporting import summaries
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.study import studies_on_rig, study_loader
@@ -246,7 +246,7 @@ def test_a_map_of_flags_names_them():
     assert len(there) > 1
     (panel,) = rsfstudy.plot(results, "slip_mode").axes
     names = [text.get_text() for text in panel.get_legend().get_texts()]
-    assert names == [SLIP_MODES[int(mode)].replace("_", " ") for mode in there]
+    assert names == [SLIP_MODE_NAMES[int(mode)].replace("_", " ") for mode in there]
 
 
 def test_one_scale_for_several_rigs_is_refused(cycles):
@@ -270,7 +270,7 @@ def test_figures_and_tables_show_units(cycles, capsys):
     texts = [axes.get_xlabel() + axes.get_ylabel() for axes in drawn.axes]
     assert any(r"Load point velocity" in text and r"($\mu$m/s)" in text for text in texts)
     assert any("(s)" in text for text in texts)
-    table_layout.print_summary_piece(lattice_tables.build_primary_output_table(cycles))
+    table_layout.print_table_or_sentence(lattice_tables.build_primary_output_table(cycles))
     said = capsys.readouterr().out
     assert "recurrence interval of stick-slip, in s" in said
     interval = float(cycles.rsf.in_units()["recurrence_interval"][0, 0, 0])

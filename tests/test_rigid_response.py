@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.responses.rigid_response import RigidResponse
-from rsfstudy.slider.equations import quasi_static_log_slip_rate
+from rsfstudy.slider.equations import compute_quasi_static_log_slip_rate
 from rsfstudy.status import Status
 
 
@@ -71,7 +71,7 @@ def test_ends_of_a_response_are_the_direct_effect_and_the_steady_state(law, rate
     scene = Scene(law=law, load_velocity_ratio=rate)
     found = response(rate, law=law)
     direct = found["direct_stress_change"]
-    assert quasi_static_log_slip_rate(scene, direct, 0.0) == pytest.approx(
+    assert compute_quasi_static_log_slip_rate(scene, direct, 0.0) == pytest.approx(
         math.log(rate), rel=1e-12
     )
     assert found["shear_stress"][0] == pytest.approx(scene.mu_star + direct, rel=1e-14)

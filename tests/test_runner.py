@@ -174,7 +174,7 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
 
         def ran(name, fault=""):
             study = replace(faulty_study(fault, (3.0,) if fault else ()), name=name)
-            results = study_runs.prepare_run_with_progress(
+            results = study_runs.make_run_function_with_progress(
                 study, study_run.OutputOptions(output=tmp_path), where, False
             )()
             return [Status(code).name for code in results["status"].values]
@@ -202,7 +202,7 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
     def mapper(task, batches):
         if lost:
             raise RunError("the connection to the Dask scheduler is lost")
-        yield from worker_pool.compute_serially(task, batches)
+        yield from worker_pool.compute_cell_batches_serially(task, batches)
 
     def start(_processes, file):
         started.append(file)
@@ -211,7 +211,7 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
     monkeypatch.setattr(worker_pool, "start_local_cluster", start)
     monkeypatch.setattr(worker_pool, "make_dask_batch_mapper", lambda *_where: mapper)
     with worker_pool.WorkerPool(1, log_path=tmp_path / "workers.log") as where:
-        begin = study_runs.prepare_run_with_progress(
+        begin = study_runs.make_run_function_with_progress(
             faulty_study(), study_run.OutputOptions(output=tmp_path), where, False
         )
         with pytest.raises(RunError, match="is lost"):

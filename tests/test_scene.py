@@ -21,7 +21,7 @@ from rsfstudy.slider.parts import number
 
 def test_a_field_of_a_users_own_may_bear_any_name():
     @dataclasses.dataclass(frozen=True, kw_only=True)
-    class Renamed(laws.BUILT_IN_PARTS["slip"]):
+    class Renamed(laws.BUILT_IN_LAW_CLASS_BY_NAME["slip"]):
         kappa: float = number(1.0, "$\\kappa$", "1", "a number of its own")
 
         name = "renamed"
@@ -34,7 +34,7 @@ def test_every_synonym_leads_to_a_field_or_law_that_is_there():
         assert name not in SCENE_FIELD_NAMES
         if remedy.startswith("Write "):
             assert re.match(r"Write (\w+)", remedy)[1] in SCENE_FIELD_NAMES
-    assert set(field_name_hints._LAW_NAME_BY_ALIAS.values()) <= set(laws.BUILT_IN_PARTS)
+    assert set(field_name_hints._LAW_NAME_BY_ALIAS.values()) <= set(laws.BUILT_IN_LAW_CLASS_BY_NAME)
 
 
 def test_a_scene_cannot_be_changed():

@@ -10,7 +10,7 @@ import pytest
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
+from rsfstudy.measure_base.settling_checks import is_steady_sliding_linearly_stable
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
@@ -19,11 +19,11 @@ from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.quantities import Quantity
 from rsfstudy.responses._recorded_motion import compute_settled_friction_flag
 from rsfstudy.responses.step_response import StepResponse
-from rsfstudy.slider.equations import equations_between_ruptures
+from rsfstudy.slider.equations import build_equations_between_ruptures
 from rsfstudy.slider.fluid import Fluid
-from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
-from rsfstudy.slider.parts import POSITIVE, Numbers, number
-from rsfstudy.slider.stability import largest_linear_growth_rate
+from rsfstudy.slider.parameter_layout import FLUID, LOG_SLOWNESS_UPPER_LIMIT
+from rsfstudy.slider.parts import POSITIVE, FloatTuple, number
+from rsfstudy.slider.stability import compute_largest_linear_growth_rate
 from rsfstudy.status import Status
 
 SLIDER = {
@@ -42,7 +42,7 @@ DECAYS = {**SLIDER, "stiffness_ratio": 1.1, "load_velocity_ratio": 300.0}
 def auxiliary_rates(log_slip_rate, states, fraction, p):
     """Return dE/dt = V**2 - c E of a passive unknown, and a pressure decay."""
     energy, pressure = states
-    time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    time = fraction * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT))
     return fraction * math.exp(log_slip_rate) - p[FLUID] * time * energy, -time * pressure
 
 
@@ -68,7 +68,7 @@ class Dissipation(Fluid):
     def effects(self):
         return ("dissipation",)
 
-    def parameter_values(self, scene: Scene) -> Numbers:
+    def parameter_values(self, scene: Scene) -> FloatTuple:
         return (self.energy_loss,)
 
 
@@ -124,7 +124,7 @@ def test_no_motion_settles_where_small_changes_grow(terminal):
     its work are the same as without the settling event.
     """
     scene = Scene(**CYCLES, fluid=Dissipation)
-    growth = largest_linear_growth_rate(scene, scene.log_load_velocity)
+    growth = compute_largest_linear_growth_rate(scene, scene.log_load_velocity)
     assert growth is not None
     assert growth.is_positive
     events = events_until_third_rise(scene, approach_to_steady_state(0.5, terminal=terminal))
@@ -139,7 +139,7 @@ def test_stability_is_computed_at_the_first_settling_event(fluid, level, monkeyp
 
     def growth_rate(scene, log_slip_rate):
         scenes.append(scene)
-        return largest_linear_growth_rate(scene, log_slip_rate)
+        return compute_largest_linear_growth_rate(scene, log_slip_rate)
 
     monkeypatch.setattr(Scene, "largest_linear_growth_rate", growth_rate)
     scene = Scene(**CYCLES, fluid=fluid)
@@ -151,7 +151,9 @@ def test_an_excluded_unknown_is_left_out_of_the_distance():
     start, distance = (0.02, 0.01, 5.0, 0.0), []
     for fluid in (Dissipation, Excluded):
         scene = Scene(**CYCLES, fluid=fluid)
-        point = equations_between_ruptures(scene, with_time=False).evaluate_point(start)
+        point = build_equations_between_ruptures(scene, with_time=False).evaluate_motion_point(
+            start
+        )
         distance.append(point.distance_from_steady_state)
         steady = point.state + scene.b * point.log_slip_rate
     assert distance[0] > 5.0
@@ -196,12 +198,12 @@ def test_growth_of_zero_is_undecided(off, settles):
     outcome = LimitCycle(phases=2)(scene, Accuracy(1e-4))
     if settles:
         assert outcome.status is Status.NO_LIMIT_CYCLE
-        assert steady_sliding_is_linearly_stable(scene)
+        assert is_steady_sliding_linearly_stable(scene)
     else:
         assert outcome.status is Status.UNVERIFIED
         assert "undecided" in outcome.message
         with pytest.raises(MotionStopped, match="undecided"):
-            steady_sliding_is_linearly_stable(scene)
+            is_steady_sliding_linearly_stable(scene)
 
 
 @pytest.mark.parametrize(("ratio", "flag"), [(0.99, 0.0), (1.0, math.nan), (1.2, 1.0)])

@@ -11,8 +11,8 @@ from rsfstudy.slider import stability
 from rsfstudy.slider.evolution_derivatives import compute_state_evolution_derivatives
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import POSITIVE, Numbers, number
-from rsfstudy.slider.steady_state import steady_sliding
+from rsfstudy.slider.parts import POSITIVE, FloatTuple, number
+from rsfstudy.slider.steady_state import compute_steady_sliding
 
 #: Value of ln(V/V_*) at which steady friction bends.
 BEND = 0.3
@@ -44,7 +44,7 @@ class Bent(Law):
     evolution = staticmethod(evolution)
     steady_states = staticmethod(steady_states)
 
-    def parameter_values(self, scene: Scene) -> Numbers:
+    def parameter_values(self, scene: Scene) -> FloatTuple:
         return (*super().parameter_values(scene), self.bend_width)
 
 
@@ -59,8 +59,8 @@ def test_critical_stiffness_of_a_law_that_bends_sharply(width, place):
     scene = Scene(law=Bent, normal_stress="constant", a=0.01, stiffness=1e-3, bend_width=width)
     log_slip_rate = BEND + place * width
     exact = scene.b * (1.0 + 1.0 / math.cosh(place) ** 2) - scene.a
-    ours = stability.critical_stiffness(scene, log_slip_rate)
-    steady = steady_sliding(scene, log_slip_rate)
+    ours = stability.compute_critical_stiffness(scene, log_slip_rate)
+    steady = compute_steady_sliding(scene, log_slip_rate)
     assert steady is not None
     error = compute_state_evolution_derivatives(scene, steady).relative_error
     # The derivative is b/(b - a) = 2 times as large as its difference from a.
@@ -77,6 +77,6 @@ def test_critical_stiffness_of_the_composite_law(log_slip_rate):
     ratio = math.exp(log_slip_rate) / scene.cutoff_velocity_ratio
     u = float(lambertw(math.exp(-ratio)).real)
     exact = (1.0 + u) * (scene.b - scene.a) + scene.b * u * ratio
-    ours = stability.critical_stiffness(scene, log_slip_rate)
+    ours = stability.compute_critical_stiffness(scene, log_slip_rate)
     # The factor b/(b - a) is 3, and differences with a step of 0.05 lose two to three digits.
     assert ours == pytest.approx(exact, rel=2e-11)

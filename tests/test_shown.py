@@ -15,10 +15,10 @@ from study_runs import call_main, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.cli.console import PlainConsole
+from rsfstudy.cli.console import LiteralTextConsole
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
-from rsfstudy.quantities import HtmlMarkup, html_symbol
+from rsfstudy.quantities import HtmlMarkup, format_symbol_as_html
 from rsfstudy.reductions import SobolIndices
 from rsfstudy.reporting import lattice_tables
 from rsfstudy.reporting.tables import build_single_scene_result_table, format_rounded_to_error
@@ -27,7 +27,7 @@ from rsfstudy.status import Status
 from rsfstudy.storage import dataset_files, rebuild_from_file
 from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim, build_verdict_table
-from rsfstudy.study.verdict_table import VerdictTable
+from rsfstudy.study.verdict_table import ClaimVerdictTable
 
 
 def rows(html):
@@ -83,7 +83,7 @@ def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
         ["C2", "x < y", "3", "2.05", "0.1", "differs, unexpected"],
     ]
     long = found.assign(claim="longer than a line " * 9)
-    assert max(map(len, repr(VerdictTable(long)).splitlines())) <= 100
+    assert max(map(len, repr(ClaimVerdictTable(long)).splitlines())) <= 100
     assert type(found[found.verdict_changed]) is pd.DataFrame
     assert found[found.verdict_changed]["id"].tolist() == ["C2"]
 
@@ -102,11 +102,11 @@ def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
     ],
 )
 def test_symbols_need_no_mathjax(formula, written):
-    assert html_symbol(formula) == written
+    assert format_symbol_as_html(formula) == written
 
 
 def test_texts_of_strangers_stay_texts():
-    assert "<script>" not in HtmlMarkup.table(["<script>"], [["<script>"]], "<script>")
+    assert "<script>" not in HtmlMarkup.format_table(["<script>"], [["<script>"]], "<script>")
 
 
 def test_the_accessor_shows_numbers_and_verdicts():
@@ -121,7 +121,8 @@ def test_the_accessor_shows_numbers_and_verdicts():
     shown = rows(done.rsf._repr_html_())
     assert ["id", "claim", "published", "computed", "tolerance and reason", "verdict"] in shown
     values = {
-        f"{value:.8g}" for value in done[rebuild_from_file.find_primary_output(done)].values.flat
+        f"{value:.8g}"
+        for value in done[rebuild_from_file.find_primary_output_name(done)].values.flat
     }
     assert len([row for row in shown if values & set(row)]) > 10
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
@@ -290,7 +291,7 @@ def test_an_error_estimate_above_the_tolerance_of_a_claim_is_reported():
 def test_redirected_output_has_lines_of_100_characters(monkeypatch):
     """The environment variable ``COLUMNS`` takes precedence."""
     monkeypatch.delenv("COLUMNS", raising=False)
-    redirected = PlainConsole(file=io.StringIO(), markup=False)
+    redirected = LiteralTextConsole(file=io.StringIO(), markup=False)
     assert redirected.width == 100
     monkeypatch.setenv("COLUMNS", "60")
-    assert PlainConsole(file=io.StringIO(), markup=False).width == 60
+    assert LiteralTextConsole(file=io.StringIO(), markup=False).width == 60

@@ -131,7 +131,7 @@ def examples():
 
 
 def test_examples_make_what_they_stand_beside(examples):
-    for slot in part_registry.SLOTS:
+    for slot in part_registry.PART_SLOTS:
         for name, part in slot.built_in_parts.items():
             scene = eval(examples["SCENES"][name], {"Scene": rsfstudy.Scene})
             assert isinstance(getattr(scene.parts, slot.name), part)

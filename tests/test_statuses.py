@@ -146,7 +146,7 @@ SLIDERS = [
     {"normal_stress": "variable", "inertia": True},
 ]
 #: All laws, and laws with two states one of which strengthens friction.
-LAWS = [{"law": law} for law in sorted(laws.BUILT_IN_PARTS)]
+LAWS = [{"law": law} for law in sorted(laws.BUILT_IN_LAW_CLASS_BY_NAME)]
 LAWS += [
     {"law": law, "a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio": 50.0}
     for law in ("two_slip_states", "two_slowness_states")

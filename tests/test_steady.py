@@ -15,11 +15,13 @@ from rsfstudy import Scene
 from rsfstudy.responses.perturbation_growth import compute_jacobian, max_growth_rate
 from rsfstudy.slider import closed_forms, laws, stability, steady_state
 from rsfstudy.slider.equations import build_equations_against_displacement
-from rsfstudy.slider.friction import effective_normal_stress_at
-from rsfstudy.slider.laws.composite import lambert_w
+from rsfstudy.slider.friction import compute_effective_normal_stress
+from rsfstudy.slider.laws.composite import compute_lambert_w
 
 #: Laws with a single b, whose steady friction is mu_* + (a - b) ln(V/V_*).
-WITH_ONE_B = {name: law for name, law in laws.BUILT_IN_PARTS.items() if issubclass(law, laws.Law)}
+WITH_ONE_B = {
+    name: law for name, law in laws.BUILT_IN_LAW_CLASS_BY_NAME.items() if issubclass(law, laws.Law)
+}
 PLAIN = sorted(name for name, law in WITH_ONE_B.items() if law.steady_states is None)
 LAWS = st.sampled_from(PLAIN)
 RATES, ANGLES, ALPHAS = st.floats(-30, 12), st.floats(50, 85), st.floats(0, 1)
@@ -41,12 +43,12 @@ def eq_7(scene: Scene, log_slip_rate: float) -> float:
 def test_critical_stiffness_is_eq_7_and_eq_8(log_slip_rate, phi, alpha, law):
     scene = Scene(law=law, phi=phi, alpha=alpha)
     closed = eq_7(scene, log_slip_rate)
-    explicit = closed_forms.critical_stiffness(
+    explicit = closed_forms.compute_critical_stiffness(
         log_slip_rate, scene.mu_star, scene.a, scene.b, cot_phi(scene), alpha
     )
     assert explicit == pytest.approx(closed, rel=1e-12)
     # Digits are lost if normal stress grows or vanishes, and in the arguments of the law.
-    ours = stability.critical_stiffness(scene, log_slip_rate)
+    ours = stability.compute_critical_stiffness(scene, log_slip_rate)
     assert ours == pytest.approx(closed, rel=1e-12 * (1.0 + abs(log_slip_rate)))
 
 
@@ -54,7 +56,7 @@ def test_critical_stiffness_is_eq_7_and_eq_8(log_slip_rate, phi, alpha, law):
 def test_constant_normal_stress_has_b_minus_a(law):
     scene = Scene(law=law, normal_stress="constant")
     for log_slip_rate in (-20.0, 0.0, 5.0):
-        critical = stability.critical_stiffness(scene, log_slip_rate)
+        critical = stability.compute_critical_stiffness(scene, log_slip_rate)
         assert critical == pytest.approx(scene.b - scene.a, rel=1e-12)
 
 
@@ -76,7 +78,7 @@ def test_the_rise_by_mass_is_that_of_the_cubic(log_norm, log_slip_rate, phi, alp
         * 10.0 ** (2.0 * log_norm)
         / (scene.a * sigma)
     )
-    ours = stability.critical_stiffness(scene, log_slip_rate)
+    ours = stability.compute_critical_stiffness(scene, log_slip_rate)
     if q < 0.99:
         assert ours == pytest.approx(eq_7(scene, log_slip_rate) / (1.0 - q), rel=1e-11 / (1.0 - q))
     elif q > 1.01:
@@ -96,7 +98,7 @@ def test_damping_lowers_it_as_the_quadratic_says(log_damping, log_slip_rate, phi
     share = (1.0 - mu_ss * cot) / (1.0 - mu_ss * cot + alpha * cot)
     undamped = eq_7(scene, log_slip_rate)
     damped = undamped - damping * math.exp(log_slip_rate) * share
-    ours = stability.critical_stiffness(scene, log_slip_rate)
+    ours = stability.compute_critical_stiffness(scene, log_slip_rate)
     assert ours == pytest.approx(max(damped, 0.0), abs=1e-11 * undamped)
 
 
@@ -105,23 +107,23 @@ def test_steady_stresses_satisfy_the_inclined_geometry(log_slip_rate, phi):
     scene = Scene(phi=phi)
     mu_ss = scene.mu_star - (scene.b - scene.a) * log_slip_rate
     assume(mu_ss * cot_phi(scene) < 0.99)
-    found = steady_state.steady_sliding(scene, log_slip_rate)
-    ratio = effective_normal_stress_at(scene, found.frictional_stress)
+    found = steady_state.compute_steady_sliding(scene, log_slip_rate)
+    ratio = compute_effective_normal_stress(scene, found.frictional_stress)
     assert ratio == pytest.approx(1.0 + cot_phi(scene) * found.frictional_stress, rel=1e-13)
     assert scene.mu_star + found.frictional_stress == pytest.approx(mu_ss * ratio, rel=1e-11)
 
 
 def test_no_steady_state_below_the_slowest_rate():
     scene = Scene()
-    slowest = steady_state.min_steady_log_slip_rate(scene)
+    slowest = steady_state.find_min_steady_log_slip_rate(scene)
     mu_ss = scene.mu_star - (scene.b - scene.a) * slowest
     assert mu_ss * cot_phi(scene) == pytest.approx(1.0, rel=1e-9)
-    assert steady_state.steady_sliding(scene, slowest + 1e-6) is not None
-    assert steady_state.steady_sliding(scene, slowest - 1e-6) is None
-    assert math.isnan(stability.critical_stiffness(scene, slowest - 1.0))
+    assert steady_state.compute_steady_sliding(scene, slowest + 1e-6) is not None
+    assert steady_state.compute_steady_sliding(scene, slowest - 1e-6) is None
+    assert math.isnan(stability.compute_critical_stiffness(scene, slowest - 1.0))
     with pytest.raises(ValueError, match="steady sliding does not exist"):
-        stability.linear_growth_rates(scene, slowest - 1.0)
-    assert steady_state.min_steady_log_slip_rate(Scene(normal_stress="constant")) == -math.inf
+        stability.compute_linear_growth_rates(scene, slowest - 1.0)
+    assert steady_state.find_min_steady_log_slip_rate(Scene(normal_stress="constant")) == -math.inf
 
 
 @pytest.mark.parametrize("period", [1e-3, 5.0, 1e4])
@@ -131,10 +133,10 @@ def test_a_small_mass_takes_no_digits_of_the_growth_rates(period):
     The mass adds a single root, which is 1e9 to 1e24 times larger than the other roots.
     """
     scene = Scene(law="slip", fluid="dilatant", drainage=1e-3, dilatancy=1e-3, stiffness=0.003)
-    heavy = stability.linear_growth_rates(scene.with_(inertia=True, period=period), 0.0)
+    heavy = stability.compute_linear_growth_rates(scene.with_(inertia=True, period=period), 0.0)
     assert heavy[-1].real < -1e9
     np.testing.assert_allclose(
-        heavy[:-1].real, stability.linear_growth_rates(scene, 0.0).real, rtol=1e-8
+        heavy[:-1].real, stability.compute_linear_growth_rates(scene, 0.0).real, rtol=1e-8
     )
 
 
@@ -165,7 +167,7 @@ CUT_OFFS = ("composite", "cut_off")
 def composite(scene: Scene, log_slip_rate: float) -> float:
     """Return (1 + w)(b - a) + b w V/V_c with w exp(w) = exp(-V/V_c)."""
     relative = math.exp(log_slip_rate) / scene.cutoff_velocity_ratio
-    w = lambert_w(math.exp(-relative))
+    w = compute_lambert_w(math.exp(-relative))
     return (1.0 + w) * (scene.b - scene.a) + scene.b * w * relative
 
 
@@ -185,7 +187,7 @@ def test_critical_stiffness_of_cut_offs(log_slip_rate, log_cutoff, b_over_a):
         cutoff = math.exp(log_cutoff)
         scene = Scene(law=law, cutoff_velocity_ratio=cutoff, b_over_a=b_over_a, stiffness=1.0,
                       **CONSTANT)  # fmt: skip
-        ours = stability.critical_stiffness(scene, log_slip_rate)
+        ours = stability.compute_critical_stiffness(scene, log_slip_rate)
         exact = max(formula(scene, log_slip_rate), 0.0)
         assert ours == pytest.approx(exact, abs=1e-8 * scene.b)
 
@@ -193,10 +195,10 @@ def test_critical_stiffness_of_cut_offs(log_slip_rate, log_cutoff, b_over_a):
 def test_no_steady_sliding_below_the_slowest_by_laws_with_a_rate_of_their_own():
     for law in CUT_OFFS:
         scene = Scene(law=law)
-        slowest = steady_state.min_steady_log_slip_rate(scene)
-        assert steady_state.steady_sliding(scene, slowest + 1e-6) is not None
-        assert steady_state.steady_sliding(scene, slowest - 1e-6) is None
-        assert steady_state.min_steady_log_slip_rate(scene.with_(**CONSTANT)) == -math.inf
+        slowest = steady_state.find_min_steady_log_slip_rate(scene)
+        assert steady_state.compute_steady_sliding(scene, slowest + 1e-6) is not None
+        assert steady_state.compute_steady_sliding(scene, slowest - 1e-6) is None
+        assert steady_state.find_min_steady_log_slip_rate(scene.with_(**CONSTANT)) == -math.inf
 
 
 @pytest.mark.parametrize("excess", [-0.02, -0.055, -0.1])
@@ -207,6 +209,6 @@ def test_stress_keeps_its_sign_however_weak_a_regularised_fault_becomes(excess):
     """
     scene = Scene(regularised=True, mu_star=0.05, normal_stress="constant")
     mu = scene.a * math.asinh(0.5 * math.exp((scene.mu_star + excess) / scene.a))
-    assert steady_state.frictional_stress_after_jump(
+    assert steady_state.compute_frictional_stress_after_jump(
         scene, excess
     ) + scene.mu_star == pytest.approx(mu, rel=1e-9)

@@ -24,7 +24,7 @@ from rsfstudy.motion.in_place_functions import (
     build_in_place_functions,
 )
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.motion.motion_loop import advance_to_step_end
+from rsfstudy.motion.motion_loop import move_step_begin_to_step_end
 from rsfstudy.motion.steppers import Stepper, unrolled_step
 from rsfstudy.motion.steppers.order_eight import OrderEightStepper
 from rsfstudy.motion.steppers.scipy import (
@@ -33,12 +33,12 @@ from rsfstudy.motion.steppers.scipy import (
     _build_interpolant_of_unknowns,
 )
 from rsfstudy.motion.work_meter import MotionStopped
-from rsfstudy.motion.workspace import Workspace, create_workspace, workspace_size
+from rsfstudy.motion.workspace import Workspace, compute_workspace_size, create_workspace
 from rsfstudy.slider.equations import (
-    Equations,
-    equations_at_imposed_slip_rate,
-    equations_between_ruptures,
-    equations_in_rupture,
+    EquationsOfMotion,
+    build_equations_at_imposed_slip_rate,
+    build_equations_between_ruptures,
+    build_equations_in_rupture,
 )
 from rsfstudy.status import Status
 
@@ -46,10 +46,10 @@ SLOW = Scene(stiffness_ratio=1.5, load_velocity_ratio=1.5)
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
 #: Systems of one to five equations, each with a state inside its domain.
 SYSTEMS = [
-    (equations_at_imposed_slip_rate(Scene(), 2.0), (0.05,)),
-    (equations_between_ruptures(SLOW, with_time=False), (0.01, 0.004)),
-    (equations_in_rupture(Scene(**CYCLE), with_time=True), (0.2, 17.0, 0.19, 0.0)),
-    (equations_between_ruptures(Scene(fluid="dilatant", load_velocity_ratio=3.0), with_time=True),
+    (build_equations_at_imposed_slip_rate(Scene(), 2.0), (0.05,)),
+    (build_equations_between_ruptures(SLOW, with_time=False), (0.01, 0.004)),
+    (build_equations_in_rupture(Scene(**CYCLE), with_time=True), (0.2, 17.0, 0.19, 0.0)),
+    (build_equations_between_ruptures(Scene(fluid="dilatant", load_velocity_ratio=3.0), with_time=True),
      (0.01, 0.004, 0.001, -0.01, 0.0)),
 ]  # fmt: skip
 
@@ -67,7 +67,7 @@ def weighted(weights, rates):
     return total
 
 
-def plain_step(equations: Equations, y, length: float, tolerance: float):
+def plain_step(equations: EquationsOfMotion, y, length: float, tolerance: float):
     """Return stages, new unknowns and local error of a step.
 
     The function uses loops over the tableau of SciPy.
@@ -106,7 +106,7 @@ def test_the_unrolled_step_is_that_of_plain_loops_to_the_bit(equations, y, lengt
     assert error > 0.0
 
 
-def scipy_solver(method, equations: Equations, y, tolerance: float, **options):
+def scipy_solver(method, equations: EquationsOfMotion, y, tolerance: float, **options):
     """Return a solver of SciPy for the equations."""
     return method(
         lambda _clock, state: equations.evaluate_rates(tuple(state.tolist())),
@@ -132,7 +132,7 @@ def test_a_step_is_scipys(equations, y):
     assert new == pytest.approx(solver.y, rel=1e-14, abs=1e-15)
 
 
-def ends_of_steps(equations: Equations, y, by: str, steps: int, **options):
+def ends_of_steps(equations: EquationsOfMotion, y, by: str, steps: int, **options):
     """Return the independent variable at the end of each step.
 
     The second return value is the integrator.
@@ -141,7 +141,7 @@ def ends_of_steps(equations: Equations, y, by: str, steps: int, **options):
     path = integrator.follow_equations(
         equations, y, [STEP_END_EVENT], local_tolerance=1e-3, **options
     )
-    return [event.clock for event in itertools.islice(path, steps + 1)], integrator
+    return [event.independent_variable for event in itertools.islice(path, steps + 1)], integrator
 
 
 @pytest.mark.parametrize("backward", [False, True])
@@ -161,19 +161,19 @@ def test_plain_python_takes_the_steps_of_scipy(equations, y, steps, backward):
     assert ours[0] == pytest.approx(theirs[0], rel=1e-9)
     assert math.copysign(1.0, ours[0][-1]) == (-1.0 if backward else 1.0)
     assert abs(ours[1].evaluations - theirs[1].evaluations) <= 2
-    assert ours[1].work_meter.steps == theirs[1].work_meter.steps == steps
+    assert ours[1].work_meter.step_count == theirs[1].work_meter.step_count == steps
 
 
 # ---- what a stepper owes the loop ----------------------------------------------------------------
 def begun(
-    equations: Equations, y, tolerance: float, kind: type[Stepper], method: str = "DOP853"
+    equations: EquationsOfMotion, y, tolerance: float, kind: type[Stepper], method: str = "DOP853"
 ) -> tuple[Stepper, SimpleNamespace, Workspace]:
     """Return a stepper at the start of a path, with motion and workspace."""
     stepper = kind((equations,), {equations.regime: method})
     n, states = len(y), equations.state_count
     given = {"tolerance": tolerance, "budget": 10**6, "direction": 1.0, "end_time": math.inf}
     motion = SimpleNamespace(**{**dict.fromkeys(array_layout.MOTION_STATE_DTYPE.names, 0), **given})
-    arrays = (workspace_size(n, states, 0), 2 * n, n)
+    arrays = (compute_workspace_size(n, states, 0), 2 * n, n)
     block, unknowns, scales = (memoryview(np.zeros(numbers)) for numbers in arrays)
     unknowns[:n], scales[:] = np.array(y, dtype=float), np.array(equations.unknown_scales)
     functions = [*build_in_place_functions(equations)]
@@ -200,7 +200,7 @@ def test_a_step_taken_anew_ends_at_the_clock_asked_for(kind, method, part):
     stepper, motion, space = begun(equations, y, 1e-6, kind, method)
     for number in range(6):
         if number:
-            advance_to_step_end(motion, space)
+            move_step_begin_to_step_end(motion, space)
         assert stepper.attempt_step(motion, space, 1.0) == motion.end - motion.clock > 0.0
     began, start = motion.clock, tuple(space.y[:2])
     clock = began + part * (motion.end - began)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 
-from rsfstudy.fitting.recorded_loading import stepwise_loading
+from rsfstudy.fitting.recorded_loading import build_stepwise_loading_history
 from rsfstudy.fitting.velocity_steps import detect_velocity_steps
 
 UP = ((0.0, 1.0), (60.0, 10.0))
@@ -103,7 +103,7 @@ def test_an_overshoot_is_one_step_through_its_pieces() -> None:
     assert 79.8 < step.start < step.end < 80.7
     assert max(speed for _begins, speed in step.velocity_profile) > 14.0
     # The pieces of the loading reproduce the recorded displacement.
-    pieces = stepwise_loading(0.0, [step])
+    pieces = build_stepwise_loading_history(0.0, [step])
     speeds_of = pieces[:, 1]
     by_pieces = np.sum(np.diff(np.append(pieces[:, 0], time[-1])) * speeds_of)
     assert by_pieces == pytest.approx(moved[-1], abs=0.2)

@@ -44,7 +44,7 @@ def test_without_rate_weakening_stiffness_is_given_by_itself():
     scene = Scene(**STRENGTHENING)
     assert scene.critical_stiffness == 0.0
     assert scene.stiffness_ratio == math.inf
-    assert steady_state.min_steady_log_slip_rate(scene) == -math.inf
+    assert steady_state.find_min_steady_log_slip_rate(scene) == -math.inf
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -52,7 +52,7 @@ def test_without_rate_weakening_stiffness_is_given_by_itself():
 @pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {}, {"inertia": True}])
 def test_without_rate_weakening_nothing_grows(law, b_over_a, effects):
     scene = Scene(law=law, b_over_a=b_over_a, stiffness=0.05, load_velocity_ratio=3.0, **effects)
-    assert stability.linear_growth_rates(scene, scene.log_load_velocity)[0].real < 0.0
+    assert stability.compute_linear_growth_rates(scene, scene.log_load_velocity)[0].real < 0.0
     found = LinearStability()(scene, Accuracy())
     assert found.status is Status.STABLE_AT_ANY_STIFFNESS
     assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE

@@ -71,8 +71,8 @@ def test_critical_stiffness_is_that_over_one_plus_c(law, c):
     """The critical stiffness is divided by 1 + c at constant normal stress."""
     scene = Scene(law=law, **CONSTANT)
     for log_slip_rate in (-5.0, 0.0, 2.0):
-        ours = stability.critical_stiffness(scene.with_(stress_dependence=c), log_slip_rate)
-        usual = stability.critical_stiffness(scene, log_slip_rate)
+        ours = stability.compute_critical_stiffness(scene.with_(stress_dependence=c), log_slip_rate)
+        usual = stability.compute_critical_stiffness(scene, log_slip_rate)
         assert ours == pytest.approx(usual / (1.0 + c), rel=1e-11)
 
 
@@ -86,7 +86,9 @@ def test_critical_stiffness_with_variable_normal_stress(c, phi, alpha, log_slip_
     cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_slip_rate
     sigma = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
     exact = (scene.b - scene.a) * sigma / (1.0 + c - cot * (mu_ss - alpha))
-    assert stability.critical_stiffness(scene, log_slip_rate) == pytest.approx(exact, rel=1e-11)
+    assert stability.compute_critical_stiffness(scene, log_slip_rate) == pytest.approx(
+        exact, rel=1e-11
+    )
 
 
 def equivalent(scene: Scene) -> Scene:
@@ -113,7 +115,9 @@ def equivalent(scene: Scene) -> Scene:
 def test_small_steps_look_like_another_slider_without_it(law, c, ratio):
     """Growth rates equal the rates of the equivalent scene over 1 + c."""
     scene = Scene(law=law, stress_dependence=c, stiffness_ratio=ratio, **CONSTANT)
-    ours, theirs = (stability.linear_growth_rates(one, 0.0) for one in (scene, equivalent(scene)))
+    ours, theirs = (
+        stability.compute_linear_growth_rates(one, 0.0) for one in (scene, equivalent(scene))
+    )
     assert (1.0 + c) * ours == pytest.approx(theirs, rel=1e-10)
 
 

@@ -13,7 +13,7 @@ from synthetic_records import deviation_in_stderrs
 
 import rsfstudy
 from rsfstudy.fitting.record import Record
-from rsfstudy.fitting.stress_steps import find_stress_steps
+from rsfstudy.fitting.stress_steps import find_normal_stress_steps
 from rsfstudy.status import Status
 
 #: Parameters in um and s. The stiffness of the machine is in MPa/um.
@@ -77,11 +77,13 @@ def test_steps_and_ramps_of_normal_stress_are_found(rho: float, drift: float) ->
     level = 8e6 * (1.0 + drift * time / time[-1])
     shape = np.interp(time, [99.9, 100.0, 200.0, 210.0], [1.0, 1.2, 1.2, 0.8])
     noise = synthetic.correlated_noise(len(time), rho, 0.01, 5)
-    first, second = find_stress_steps(time, level * (shape + noise))
+    first, second = find_normal_stress_steps(time, level * (shape + noise))
     assert (first.start_time, first.end_time) == pytest.approx((99.95, 99.95), abs=0.3)
-    assert first.stress_after / first.stress_before == pytest.approx(1.2, abs=0.03)
+    assert first.normal_stress_after / first.normal_stress_before == pytest.approx(1.2, abs=0.03)
     assert (second.start_time, second.end_time) == pytest.approx((200.0, 210.0), abs=1.5)
-    assert second.stress_after / second.stress_before == pytest.approx(0.8 / 1.2, abs=0.03)
+    assert second.normal_stress_after / second.normal_stress_before == pytest.approx(
+        0.8 / 1.2, abs=0.03
+    )
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9, 0.999])
@@ -90,7 +92,7 @@ def test_noise_and_drift_are_no_steps(rho: float, drift: float) -> None:
     time = 0.1 * np.arange(3_000)
     for seed in range(20):
         noise = synthetic.correlated_noise(len(time), rho, 0.02, seed)
-        assert find_stress_steps(time, 8e6 * (1.0 + drift * time / time[-1] + noise)) == []
+        assert find_normal_stress_steps(time, 8e6 * (1.0 + drift * time / time[-1] + noise)) == []
 
 
 def test_a_step_of_normal_stress_is_listed_among_those_of_velocity() -> None:

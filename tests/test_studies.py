@@ -26,7 +26,7 @@ from rsfstudy.study import study_index, study_loader
 FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
 
 
-@pytest.fixture(scope="module", params=study_index.study_names())
+@pytest.fixture(scope="module", params=study_index.list_study_names())
 def result(request, tmp_path_factory):
     """Return the results of a reduced study, and the path of its file."""
     return named_results(request.param, tmp_path_factory)
@@ -238,7 +238,9 @@ def test_what_is_reduced_carries_the_errors_of_its_cells(result):
         assert (error >= 0.0).where(dataset[reduction.name].notnull(), True).all(), reduction.name
 
 
-@pytest.mark.parametrize("result", study_index.study_names()[::7], indirect=True, scope="module")
+@pytest.mark.parametrize(
+    "result", study_index.list_study_names()[::7], indirect=True, scope="module"
+)
 def test_the_plain_plot_draws_any_lattice(result):
     foreign = json.loads(result[0].attrs["declaration"])
     foreign["plot"] = "lines"

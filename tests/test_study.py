@@ -109,7 +109,7 @@ def declared(**fields) -> Study:
 def test_a_zipped_axis_bears_its_own_values_whatever_the_first_cell_needs(order):
     case = Axis("case", {"weak": {"alpha": 0.25}, "strong": {"alpha": 0.5}})
     study = declared(axes=[Axis("normal_stress", order), case])
-    assert CellPlan(study).coordinates["alpha"][1].tolist() == [0.25, 0.5]
+    assert CellPlan(study).lattice_coordinates["alpha"][1].tolist() == [0.25, 0.5]
 
 
 def test_coordinates_are_taken_from_the_scenes_of_the_plan(monkeypatch, tmp_path):
@@ -236,7 +236,7 @@ MIXED = Study(
 )
 
 
-@pytest.mark.parametrize("name", ["mixed", *study_index.study_names()])
+@pytest.mark.parametrize("name", ["mixed", *study_index.list_study_names()])
 def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     """A worker reconstructs each cell from its key and its changes.
 
@@ -245,13 +245,15 @@ def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     study = MIXED if name == "mixed" else study_loader.load_study(name)
     plan = CellPlan(study)
     numbers = np.unique(np.linspace(0, study.size - 1, 72).astype(int))
-    task = cell_computation.CellTask(study.base, study.measure, study.accuracy)
+    task = cell_computation.SharedCellSettings(study.base, study.measure, study.accuracy)
     monkeypatch.setattr(cell_computation, "_load_cell_task", lambda _sent: task)
     monkeypatch.setattr(cell_computation, "_FINISHED_CELLS_HANDOVER_INTERVAL", np.inf)
     monkeypatch.setattr(task.output_packer, "pack_cell", lambda *finished: finished)
     monkeypatch.setattr(cell_computation, "compute_cell", lambda _task, cell: (cell, 0.0))
     found = pickle.loads(
-        cell_computation.compute_batch(b"", cell_computation.pack_cell_batch(plan, numbers))
+        cell_computation.compute_packed_cell_batch(
+            b"", cell_computation.pack_cell_batch(plan, numbers)
+        )
     )
     for place, (key, cell, _seconds) in zip(numbers.tolist(), found, strict=True):
         scene, changes = study.cell(place)

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import rsfstudy
-from rsfstudy._former_modules import FORMER_MODULES
+from rsfstudy._former_modules import NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE
 
 ROOT = Path(rsfstudy.__file__).parent
 #: Packages that only export names of other packages.
@@ -125,9 +125,11 @@ def test_surfaces_load_no_module():
     assert ran.stdout.strip() == ""
 
 
-@pytest.mark.parametrize("name", [n for n, (present, _) in FORMER_MODULES.items() if present])
+@pytest.mark.parametrize(
+    "name", [n for n, (present, _) in NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE.items() if present]
+)
 def test_former_modules_stay_importable(name):
-    present, public = FORMER_MODULES[name]
+    present, public = NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE[name]
     new = importlib.import_module(f"rsfstudy.{present}")
     sys.modules.pop(f"rsfstudy.{name}", None)
     with warnings.catch_warnings(record=True) as caught:

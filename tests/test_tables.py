@@ -65,25 +65,25 @@ def in_one_piece(piece: str, lines: list[str]) -> bool:
     return any(f" {piece} " in f" {line} " for line in lines)
 
 
-@pytest.mark.parametrize("name", study_index.study_names())
+@pytest.mark.parametrize("name", study_index.list_study_names())
 def test_results_of_every_study(name, printed, tmp_path_factory):
     dataset, _path = named_results(name, tmp_path_factory)
     shown = [
         lattice_tables.build_primary_output_table(dataset),
         *reduction_tables.build_reduction_tables(dataset),
-        machine_readable.build_contents_table(dataset),
+        machine_readable.build_result_variables_table(dataset),
     ]
-    shown += [verdict_tables.claims_table(study_runs.check(dataset))]
+    shown += [verdict_tables.build_claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):
         for width in WIDTHS:
-            lines = printed(width, table_layout.print_summary_piece, table)
+            lines = printed(width, table_layout.print_table_or_sentence, table)
             assert not [piece for piece in pieces(table) if not in_one_piece(piece, lines)]
 
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_declarations_of_every_study(width, printed, tmp_path):
     """The points of all axes are printed in one piece."""
-    for name in study_index.study_names():
+    for name in study_index.list_study_names():
         study = study_loader.load_study(name)
         declared = study_declarations.StudyDeclaration(study, tmp_path)
         lines = printed(width, study_declarations.print_study_declaration, declared)
@@ -115,7 +115,7 @@ def test_a_relation_stays_with_its_number(printed):
     for width in range(16, 121):
         lines = printed(
             width,
-            table_layout.print_summary_piece,
+            table_layout.print_table_or_sentence,
             TextTable([row, row], wrappable_columns={"claim"}),
         )
         assert sum(in_one_piece("< 1", [line]) for line in lines) == 2
@@ -124,14 +124,14 @@ def test_a_relation_stays_with_its_number(printed):
 
 def test_what_is_wider_than_the_terminal_is_there_to_its_last_character(printed):
     path = "/a/very/long/path" * 9
-    lines = printed(40, table_layout.print_summary_piece, {"file": path})
+    lines = printed(40, table_layout.print_table_or_sentence, {"file": path})
     assert path in "".join("".join(lines).split())
 
 
 def test_a_column_of_numbers_ends_at_one_place(printed):
     lines = printed(
         80,
-        table_layout.print_summary_piece,
+        table_layout.print_table_or_sentence,
         TextTable([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}]),
     )
     found = [line.rstrip() for line in lines[2:4]]
@@ -143,7 +143,7 @@ def test_notebooks_show_the_same_claims(tmp_path_factory):
     dataset, _path = named_results("rate_step_boundary", tmp_path_factory)
     found = rsfstudy.check(dataset)
     shown = of_html(found._repr_html_())
-    told = verdict_tables.claims_table(found).rows
+    told = verdict_tables.build_claims_table(found).rows
     assert [list(row.values()) for row in told] == [list(row) for row in shown[1:]]
     assert call_main("check", _path).returncode == 0
 

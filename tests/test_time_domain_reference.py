@@ -14,7 +14,7 @@ from time_domain_reference import TimeDomainMotion, rows_to_columns
 
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import ENGINES, PYTHON, SCIPY
+from rsfstudy.motion.engines import ENGINE_NAMES, PYTHON, SCIPY
 from rsfstudy.motion.events import fall, maximum, minimum, rise
 from rsfstudy.motion.integrator import Integrator
 
@@ -165,7 +165,7 @@ def in_time(name: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
 
 @pytest.mark.parametrize(
     ("name", "engine"),
-    [(name, by) for name in MOTIONS for by in (ENGINES if name in EVENTFUL else NOT_COMPILED)],
+    [(name, by) for name in MOTIONS for by in (ENGINE_NAMES if name in EVENTFUL else NOT_COMPILED)],
 )
 def test_motions_are_those_of_time(name, engine):
     """Motions agree with the reference within 13 times rtol.
@@ -213,7 +213,7 @@ def events_in_time(name: str) -> list[list]:
     return TimeDomainMotion(which).solve([until], functions, directions)[1]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_events_are_those_of_time(name, engine):
     """Events agree with the reference within 20 times rtol.

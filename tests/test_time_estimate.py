@@ -10,7 +10,7 @@ from study_runs import run
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.api import progress
 from rsfstudy.execution.cell_plan import order_cells_by_golden_section
-from rsfstudy.execution.time_estimate import TimeEstimate
+from rsfstudy.execution.time_estimate import RemainingTimeEstimator
 from rsfstudy.measures import LinearStability
 
 Y, X = np.meshgrid(np.linspace(0.0, 1.0, 200), np.linspace(0.0, 1.0, 200), indexing="ij")
@@ -28,10 +28,10 @@ MAPS = {
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_estimate_is_correct_to_a_factor_of_two(name, workers):
     times = MAPS[name].ravel()[order_cells_by_golden_section(np.arange(MAPS[name].size))]
-    estimate = TimeEstimate(workers)
+    estimate = RemainingTimeEstimator(workers)
     for done, seconds in enumerate(times.tolist(), start=1):
         estimate.record_cell_time(seconds)
-        remaining = estimate.remaining_seconds(times.size - done)
+        remaining = estimate.estimate_remaining_seconds(times.size - done)
         if remaining is not None:
             break
     assert done < 0.02 * times.size
@@ -39,15 +39,15 @@ def test_the_estimate_is_correct_to_a_factor_of_two(name, workers):
 
 
 def test_there_is_no_estimate_from_few_or_different_times():
-    estimate = TimeEstimate(1)
+    estimate = RemainingTimeEstimator(1)
     for seconds in (math.nan, *[1.0] * 11):
-        assert estimate.remaining_seconds(100) is None
+        assert estimate.estimate_remaining_seconds(100) is None
         estimate.record_cell_time(seconds)
-    assert estimate.remaining_seconds(100) is None
+    assert estimate.estimate_remaining_seconds(100) is None
     estimate.record_cell_time(1.0)
-    assert estimate.remaining_seconds(100) == pytest.approx(100.0)
+    assert estimate.estimate_remaining_seconds(100) == pytest.approx(100.0)
     estimate.record_cell_time(1000.0)
-    assert estimate.remaining_seconds(100) is None
+    assert estimate.estimate_remaining_seconds(100) is None
 
 
 def lines(updates, monkeypatch, **options):

@@ -13,10 +13,10 @@ from study_runs import cell_key
 from rsfstudy import Scene, history, simulate
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.slider.laws import BUILT_IN_PARTS as LAWS
+from rsfstudy.slider.laws import BUILT_IN_LAW_CLASS_BY_NAME as LAWS
 
 IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
 #: A train that starts later with a jump, and ends with a jump.
@@ -71,7 +71,7 @@ TIMES = np.linspace(0.5, 40.0, 80)
 SMALL = 1e-5
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_the_load_point_is_on_the_integral_of_its_sine(engine):
     """The load point displacement is the integral of the sine function.
 

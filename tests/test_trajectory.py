@@ -9,7 +9,7 @@ from motion_helpers import cot_phi
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import IncompleteWarning, NoResultWarning
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 
 
 def test_steady_sliding_stays_steady():
@@ -77,7 +77,7 @@ def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
 PULSE = {"law": "slowness", "normal_stress": "constant", "b_over_a": 1.5, "hold_time": 100.0}
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_beyond_the_norm_without_mass_or_damping_it_is_no_physics(engine):
     """The time at which the norm is exceeded is reported in all units.
 

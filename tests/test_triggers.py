@@ -13,7 +13,7 @@ from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
 )
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.status import Status
@@ -81,7 +81,7 @@ def test_oscillations_do_not_rise_to_the_load_point():
     assert not rises_monotonically_to_load_rate(scene, start.point)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_each_trigger_keeps_its_own_answer(engine):
     """Results of other triggers are kept if one exhausts the budget.
 

@@ -16,7 +16,11 @@ from hypothesis import strategies as st
 
 from rsfstudy import Rig, read_protocol
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.units import _KNOWN_UNITS, compute_conversion_factor, convert_to_si
+from rsfstudy.rig.units import (
+    _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT,
+    compute_conversion_factor,
+    convert_to_si,
+)
 
 RIG = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 
@@ -91,7 +95,7 @@ def test_what_is_not_one_number_and_one_unit_is_refused(text):
     assert (read(text), read_without_pint(text)) == (None, None)
 
 
-@pytest.mark.parametrize("name", sorted(_KNOWN_UNITS))
+@pytest.mark.parametrize("name", sorted(_EXACT_FACTOR_AND_EXPONENTS_BY_UNIT))
 def test_units_that_both_know_are_the_same(name):
     """The conversion factors agree with pint to rounding error.
 
@@ -99,7 +103,7 @@ def test_units_that_both_know_are_the_same(name):
     """
     registry = pint.get_application_registry()
     quantity = registry.Quantity(1.0, registry.parse_units(name)).to_base_units()
-    size, exponents = _KNOWN_UNITS[name]
+    size, exponents = _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT[name]
     assert quantity.magnitude == pytest.approx(size, rel=1e-15)
     dimensions = ("[mass]", "[length]", "[time]", "[temperature]", "[substance]")
     of = zip(dimensions, exponents, strict=True)

@@ -39,12 +39,12 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantities import Output
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider.part_registry import PART_CLASS_BY_FIELD_NAME, SLOTS
-from rsfstudy.slider.parts import CONDITION_BY_VALUE_RULE, field_names, is_boolean_field
+from rsfstudy.slider.part_registry import PART_CLASS_BY_FIELD_NAME, PART_SLOTS
+from rsfstudy.slider.parts import CONDITION_BY_VALUE_RULE, is_boolean_field, list_part_field_names
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim
-from rsfstudy.study.study_index import study_names
+from rsfstudy.study.study_index import list_study_names
 
 WORDINGS = Path(__file__).with_name("wordings.txt")
 
@@ -72,7 +72,7 @@ def calling(part: type) -> dict[str, Any]:
         return {}
     if part.selected_by:
         return {part.selected_by: True if is_boolean_field(part, part.selected_by) else 1.0}
-    slot = next(slot for slot in SLOTS if part in slot.built_in_parts.values())
+    slot = next(slot for slot in PART_SLOTS if part in slot.built_in_parts.values())
     return (
         {slot.name: part.name}
         if not slot.part_class_by_selecting_field and part.name != slot.default_part_name
@@ -107,11 +107,14 @@ def test_each_field_is_held_to_its_rule(fields, name, rule):
 
 def foreign() -> Iterator[tuple[dict[str, Any], str]]:
     """Yield fields of a part together with another part of the same slot."""
-    for slot in SLOTS:
+    for slot in PART_SLOTS:
         for part in slot.built_in_parts.values():
             for other in slot.built_in_parts.values():
                 calls = calling(other)
-                for name in sorted({*field_names(part)} - {*field_names(other), part.selected_by}):
+                for name in sorted(
+                    {*list_part_field_names(part)}
+                    - {*list_part_field_names(other), part.selected_by}
+                ):
                     if PART_CLASS_BY_FIELD_NAME[name] is part:
                         yield {**calls, name: 0.5}, name
 
@@ -189,7 +192,7 @@ def known() -> dict[str, Any]:
 
     The names are the public names, all measures and reductions, and some helper functions.
     """
-    for name in study_names():
+    for name in list_study_names():
         study_loader.load_study(name)
     kinds = [*members(Measure), *members(Reduction)]
     return (
@@ -217,7 +220,7 @@ def answered(asked: str) -> str:
     The error must be raised before any file is written.
     """
     with contextlib.ExitStack() as stack:
-        for slot in SLOTS:  # Other tests register user-defined parts.
+        for slot in PART_SLOTS:  # Other tests register user-defined parts.
             stack.enter_context(mock.patch.dict(slot.user_parts, clear=True))
         if asked.startswith("rsfstudy "):
             ended = call_main(*shlex.split(asked)[1:])

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.api.fit_record import DEFAULT_FREE_PARAMETERS, STIFFNESS_FROM_RECORD, fit
-    from rsfstudy.api.html_report import write_report
-    from rsfstudy.api.result_paths import find_results
+    from rsfstudy.api.fit_record import DEFAULT_FREE_PARAMETERS, STIFFNESS_OPTION_FROM_RECORD, fit
+    from rsfstudy.api.html_report import write_html_report
+    from rsfstudy.api.result_paths import find_results_file
     from rsfstudy.api.simulation import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME, simulate
     from rsfstudy.api.study_runs import (
         apply_overrides_to_study,
-        prepare_run_with_progress,
+        make_run_function_with_progress,
         recompute_cell,
     )
 else:
@@ -40,13 +40,13 @@ else:
 __all__ = [
     "BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME",
     "DEFAULT_FREE_PARAMETERS",
-    "STIFFNESS_FROM_RECORD",
+    "STIFFNESS_OPTION_FROM_RECORD",
     "apply_overrides_to_study",
-    "find_results",
+    "find_results_file",
     "fit",
-    "prepare_run_with_progress",
+    "make_run_function_with_progress",
     "recompute_cell",
     "simulate",
-    "write_report",
+    "write_html_report",
 ]
 from rsfstudy.api import accessor as accessor  # The import registers the accessor.

@@ -71,7 +71,7 @@ class DatasetAccessor:
         from rsfstudy.api import html_report
 
         self._require_rsfstudy_dataset()
-        return html_report.dataset_html(self._dataset)
+        return html_report.format_dataset_as_html(self._dataset)
 
     @property
     @error_boundary
@@ -95,13 +95,15 @@ class DatasetAccessor:
             If more than one cell or more than one fit is selected, or if the scene has a
             user-defined part that is not available in this process.
         """
-        from rsfstudy.api.fitted_parameters import fitted_scene
-        from rsfstudy.reporting import is_fit
+        from rsfstudy.api.fitted_parameters import build_fitted_scene
+        from rsfstudy.reporting import contains_fits
         from rsfstudy.storage import StoredDataset
 
-        if is_fit(self._dataset):
-            return fitted_scene(self._dataset)
-        return StoredDataset(self._dataset).find_scene(self.study if self._is_study else None)
+        if contains_fits(self._dataset):
+            return build_fitted_scene(self._dataset)
+        return StoredDataset(self._dataset).rebuild_scene(
+            self.study if self._contains_study_results else None
+        )
 
     @property
     @error_boundary
@@ -126,9 +128,9 @@ class DatasetAccessor:
         InvalidValue
             If more than one fit is selected, or if the record has no normal stress.
         """
-        from rsfstudy.api.fitted_parameters import fitted_rig
+        from rsfstudy.api.fitted_parameters import build_fitted_rig
 
-        return fitted_rig(self._dataset)
+        return build_fitted_rig(self._dataset)
 
     @property
     @error_boundary
@@ -151,7 +153,7 @@ class DatasetAccessor:
         """
         from rsfstudy.storage import StoredDataset
 
-        self._require_study()
+        self._require_study_results()
         return StoredDataset(self._dataset).study
 
     @error_boundary
@@ -239,7 +241,7 @@ class DatasetAccessor:
         from rsfstudy.rig import DatasetUnits
 
         self._require_rsfstudy_dataset()
-        return DatasetUnits(self._dataset).convert(stress, length, time)
+        return DatasetUnits(self._dataset).convert_to_units(stress, length, time)
 
     @error_boundary
     def check(self) -> pd.DataFrame:
@@ -259,8 +261,8 @@ class DatasetAccessor:
         """
         from rsfstudy.api import study_runs
 
-        self._require_study()
-        self._require_all_cells_present("claims are checked against")
+        self._require_study_results()
+        self._require_all_axes_present("claims are checked against")
         return study_runs.check(self._dataset)
 
     @error_boundary
@@ -293,8 +295,8 @@ class DatasetAccessor:
         from rsfstudy.api import study_runs
         from rsfstudy.plots import plot_motion
 
-        if self._is_study:
-            self._require_all_cells_present("figures show")
+        if self._contains_study_results:
+            self._require_all_axes_present("figures show")
             return study_runs.plot(self._dataset, *plot_arguments, **plot_options)
         return plot_motion(self._dataset, *plot_arguments, **plot_options)
 
@@ -340,7 +342,7 @@ class DatasetAccessor:
         """
         from rsfstudy.api.motion_events import find_motion_events
 
-        if self._is_study:
+        if self._contains_study_results:
             raise DataError(
                 "the dataset contains the results of a study, but events require the "
                 "motion of one scene"
@@ -373,14 +375,14 @@ class DatasetAccessor:
         >>> holds["healing"].values.round(4)
         array([0.0554])
         """
-        from rsfstudy.api.healing_tables import measure_motion_holds
+        from rsfstudy.api.healing_tables import measure_holds_of_motion
 
-        if self._is_study:
+        if self._contains_study_results:
             raise DataError(
                 "the dataset contains the results of a study, but holds require the "
                 "motion of one scene"
             )
-        return measure_motion_holds(self._dataset)
+        return measure_holds_of_motion(self._dataset)
 
     @error_boundary
     def slip_mode(self, stick_slip_from: Any) -> xr.DataArray:
@@ -467,10 +469,10 @@ class DatasetAccessor:
         >>> list(motion.coords), motion["slip"].attrs["units"]
         (['time', 'slip'], 'D_c')
         """
-        from rsfstudy.api.simple_datasets import simplify_dataset
+        from rsfstudy.api.simple_datasets import omit_constants_and_simplify_units
 
         self._require_rsfstudy_dataset()
-        return simplify_dataset(self._dataset)
+        return omit_constants_and_simplify_units(self._dataset)
 
     @error_boundary
     def to_dataframe(self, *, decoded: bool = False) -> pd.DataFrame:
@@ -531,9 +533,9 @@ class DatasetAccessor:
         DataError
             If the dataset is not a fit.
         """
-        from rsfstudy.reporting import fit_table
+        from rsfstudy.reporting import build_fit_table
 
-        return fit_table(self._dataset)
+        return build_fit_table(self._dataset)
 
     @error_boundary
     def sample_parameters(self, n: int, seed: int = 0, *, posterior: bool = False) -> xr.Dataset:
@@ -567,9 +569,9 @@ class DatasetAccessor:
             If more than one fit is selected, if ``n`` is not a positive integer, if the fit has no
             covariance matrix, or if the fit has fewer than ``n`` posterior draws.
         """
-        from rsfstudy.api.fitted_parameters import sample_parameters
+        from rsfstudy.api.fitted_parameters import sample_fitted_parameters
 
-        return sample_parameters(self._dataset, n, seed, posterior=posterior)
+        return sample_fitted_parameters(self._dataset, n, seed, posterior=posterior)
 
     @error_boundary
     def failures(self) -> pd.DataFrame:
@@ -600,13 +602,13 @@ class DatasetAccessor:
         """
         import pandas as pd
 
-        from rsfstudy.reporting import build_frame_of_cells
+        from rsfstudy.reporting import build_data_frame_of_cells
         from rsfstudy.status import Status
         from rsfstudy.storage import StoredDataset
 
-        if self._is_study:
+        if self._contains_study_results:
             axes = [axis.dimension for axis in StoredDataset(self._dataset).declaration.axes]
-            return build_frame_of_cells(
+            return build_data_frame_of_cells(
                 self._dataset, self._dataset["status"] != int(Status.OK), axes
             )
         ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
@@ -614,7 +616,7 @@ class DatasetAccessor:
         return pd.DataFrame(rows, columns=list(ended))
 
     @property
-    def _is_study(self) -> bool:
+    def _contains_study_results(self) -> bool:
         """True if the dataset contains the results of a study."""
         self._require_rsfstudy_dataset()
         return "declaration" in self._dataset.attrs
@@ -624,7 +626,7 @@ class DatasetAccessor:
         if not {"scene", "declaration"} & set(self._dataset.attrs):
             raise DataError(_NOT_AN_RSFSTUDY_DATASET_MESSAGE)
 
-    def _require_all_cells_present(self, requested_action: str) -> None:
+    def _require_all_axes_present(self, requested_action: str) -> None:
         """Raise ``DataError`` if a selection has removed an axis."""
         from rsfstudy.storage import StoredDataset
 
@@ -637,9 +639,9 @@ class DatasetAccessor:
             )
             raise DataError(f"{text}. Use the complete dataset, without a selection.")
 
-    def _require_study(self) -> None:
+    def _require_study_results(self) -> None:
         """Raise ``DataError`` if the dataset is not from a study."""
-        if not self._is_study:
+        if not self._contains_study_results:
             raise DataError(
                 "the dataset belongs to a single scene and not to a study. Use dataset.rsf.scene."
             )

@@ -14,9 +14,9 @@ import xarray as xr
 from rsfstudy.api.simulation import simulate
 from rsfstudy.errors import DataError
 from rsfstudy.formatting import read_flag_meanings
-from rsfstudy.quantities import units_or_scale_of_variable
+from rsfstudy.quantities import read_units_or_scale
 from rsfstudy.rig import DatasetUnits, Rig
-from rsfstudy.storage import compare_same_lattice
+from rsfstudy.storage import compare_results_of_same_study
 
 
 def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
@@ -52,7 +52,7 @@ def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
         table = table[changing]
         table.attrs["constant"] = constant
     table.attrs["units"] = {
-        str(n): units_or_scale_of_variable(dataset[n].attrs) or "1"
+        str(n): read_units_or_scale(dataset[n].attrs) or "1"
         for n in table
         if table[n].dtype.kind in "iuf"
     }
@@ -91,7 +91,7 @@ def rerun_and_compare_motion(motion: xr.Dataset) -> pd.DataFrame:
             f"scene ({title}). To recompute it, call {call}, rtol={about.get('rtol', '...')}) "
             "with the original options."
         )
-    if DatasetUnits.SCALES_ATTRIBUTE in about and "laboratory" not in about:
+    if DatasetUnits.SCALES_ATTRIBUTE_NAME in about and "laboratory" not in about:
         raise DataError(
             "the units of the motion were converted without a rig. Store the motion before the "
             "units are converted, or convert the units with a rig"
@@ -109,4 +109,4 @@ def rerun_and_compare_motion(motion: xr.Dataset) -> pd.DataFrame:
         units = {"stress": "shear_stress", "length": "slip", "time": "time"}
         units = {of: str(motion[name].attrs["units"]) for of, name in units.items()}
         ours = Rig(**json.loads(about["laboratory"])).in_units(ours, **units)
-    return compare_same_lattice(motion, ours)
+    return compare_results_of_same_study(motion, ours)

@@ -13,7 +13,7 @@ import xarray as xr
 from rsfstudy.api.stress_records import StressRecord, read_stress_record
 from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import InvalidValue, NoResultWarning
-from rsfstudy.execution import provenance_attributes
+from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.fitting import (
     EVENT_QUANTITIES,
     MIN_SAMPLES,
@@ -38,7 +38,7 @@ _SUSPICIOUS_DECREASE_OVER_DETECTABLE_DROP = 10.0
 
 
 def build_event_catalogue(
-    event_numbers: Sequence[EventNumbers], variable_attributes: Mapping[str, Mapping[Any, Any]]
+    measured_events: Sequence[EventNumbers], variable_attributes: Mapping[str, Mapping[Any, Any]]
 ) -> xr.Dataset:
     """Build a dataset from the measured quantities of events.
 
@@ -58,7 +58,7 @@ def build_event_catalogue(
         Variables along the dimension ``event``, in the units of the measured variables. Each
         variable has an error estimate ``<name>_error``.
     """
-    rows = [numbers for numbers, _cut in event_numbers]
+    rows = [numbers for numbers, _cut in measured_events]
     for row, earlier in zip(rows, [{}, *rows], strict=False):
         (time, error), (before, unsure) = row["time"], earlier.get("time", (math.nan, math.nan))
         row["interval"] = time - before, error + unsure
@@ -79,14 +79,14 @@ def build_event_catalogue(
     }
     dataset["cut"] = (
         "event",
-        np.array([cut for _numbers, cut in event_numbers], dtype=np.int8),
+        np.array([cut for _numbers, cut in measured_events], dtype=np.int8),
         flags,
     )
     return copy_with_cf_encoding(
         dataset.assign_attrs(
             title="Catalogue of events",
             Conventions="CF-1.11",
-            **provenance_attributes("rsfstudy.events"),
+            **build_provenance_attributes("rsfstudy.events"),
         )
     )
 
@@ -237,18 +237,20 @@ def events(
     >>> catalogue["static_stress_drop"].values.round(1)
     array([0.5, 0.5, 0.5])
     """
-    options = ReadingOptions.parse("events", reading)
+    options = ReadingOptions.from_keywords("events", reading)
     if record is None:
         given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
         read = StressRecord(given)
     else:
         read = read_stress_record(record, columns, normal_stress, options)
-    given = dict(read.variables)
+    given = dict(read.variables_by_name)
     if not read.has_time:
         given = given | {"time": given["displacement"], "displacement": None}
-    times, stress = (_check_record_samples(name, given[name]) for name in ("time", "shear_stress"))
+    times, stress = (
+        _convert_samples_to_finite_array(name, given[name]) for name in ("time", "shear_stress")
+    )
     moved = given["displacement"]
-    moves = None if moved is None else _check_record_samples("displacement", moved)
+    moves = None if moved is None else _convert_samples_to_finite_array("displacement", moved)
     for name, samples in (("shear_stress", stress), ("displacement", moves)):
         if samples is not None and len(samples) != len(times):
             rule = f"must have {len(times)} samples, as many as 'time'"
@@ -270,7 +272,7 @@ def events(
             )
         moves = moves - stress / _parse_stiffness(stiffness, about)
     rows, detection, is_slip = read_drops(
-        times, stress, moves, check_slip=stiffness is None and not read.is_slip
+        times, stress, moves, check_slip=stiffness is None and not read.displacement_is_slip
     )
     for row in rows if not is_slip else ():
         row[0].update(dict.fromkeys(_QUANTITIES_REQUIRING_DISPLACEMENT, (math.nan, math.nan)))
@@ -299,10 +301,10 @@ def events(
     words = "smallest detectable drop of shear stress (missed once in 1,000 records)"
     dataset["smallest_drop"] = ((), detection.detectable_drop, {"long_name": words, **units})
     dataset.attrs["sign_of_shear_stress"] = int(direction)
-    if read.processing:
-        dataset.attrs["processing"] = "; ".join(read.processing)
+    if read.processing_steps:
+        dataset.attrs["processing"] = "; ".join(read.processing_steps)
     if not read.has_time:
-        dataset = _name_displacement(dataset)
+        dataset = _rename_times_to_displacements(dataset)
     if not rows and (text := _warn_if_stress_falls_without_drop(detection)):
         dataset.attrs["comment"] = text
     return dataset
@@ -333,7 +335,7 @@ def _parse_stiffness(stiffness: Any, variable_attributes: Mapping[str, Mapping[A
     return float(stiffness)
 
 
-def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
+def _convert_samples_to_finite_array(variable_name: str, values: Any) -> np.ndarray:
     """Convert samples of a record to a finite array of shape (n,)."""
     try:
         samples = np.asarray(values, dtype=float)
@@ -353,7 +355,7 @@ def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
     return samples
 
 
-def _name_displacement(dataset: xr.Dataset) -> xr.Dataset:
+def _rename_times_to_displacements(event_catalogue: xr.Dataset) -> xr.Dataset:
     """Rename ``time`` to ``displacement`` in the catalogue of a record without time."""
     words = {
         "time": "displacement at the beginning of the event",
@@ -361,9 +363,9 @@ def _name_displacement(dataset: xr.Dataset) -> xr.Dataset:
         "interval": "displacement since the beginning of the previous event",
     }
     for name, text in words.items():
-        dataset[name].attrs["long_name"] = text
-        dataset[f"{name}_error"].attrs["long_name"] = f"error estimate of {text}"
-    return dataset.rename({"time": "displacement", "time_error": "displacement_error"})
+        event_catalogue[name].attrs["long_name"] = text
+        event_catalogue[f"{name}_error"].attrs["long_name"] = f"error estimate of {text}"
+    return event_catalogue.rename({"time": "displacement", "time_error": "displacement_error"})
 
 
 def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:

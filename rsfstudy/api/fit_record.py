@@ -65,7 +65,7 @@ _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
     "and slip_distance_2."
 )
 #: Value of the argument ``stiffness`` that requests a measurement of the stiffness in the records.
-STIFFNESS_FROM_RECORD = "from record"
+STIFFNESS_OPTION_FROM_RECORD = "from record"
 #: Initial guess of the slip distance, as a fraction of the load point displacement after a step.
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Maximum value of the argument ``windows``.
@@ -74,9 +74,9 @@ _MAX_FIT_WINDOW_COUNT = 1000
 #: step.
 _MIN_WINDOW_LENGTH_OVER_FULL_LENGTH = 0.5
 #: Initial values of the scene fields in a fit. Values that the user passes take precedence.
-_INITIAL_SCENE_FIELDS = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
-_INITIAL_FIELDS_OF_ONE_STATE_LAW = {"b_over_a": 1.2}
-_INITIAL_FIELDS_OF_TWO_STATE_LAW = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
+_INITIAL_GUESS_OF_SCENE_FIELDS = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
+_INITIAL_GUESS_FOR_ONE_STATE_LAWS = {"b_over_a": 1.2}
+_INITIAL_GUESS_FOR_TWO_STATE_LAWS = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
 
 
 @error_boundary
@@ -290,14 +290,14 @@ def fit(
     if "alpha" in free:
         check_normal_stress_changes_for_alpha(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
-    ratio, machine, stiffness_error = _initial_stiffness(rig, stiffness, free, records)
+    ratio, machine, stiffness_error = _find_initial_stiffness(rig, stiffness, free, records)
     if machine:
         _check_normal_stress_is_compressive(records, numbers)
         ratio = machine / FitWindow(records[0], numbers[0]).mean_normal_stress_before_step
     if "stiffness" not in free:
         check_displacement_is_not_slip(records, numbers, ratio, machine)
-    first = _initial_scene(laws, scene, ratio * guess)
-    sought = _free_parameters(free, laws, first)
+    first = _build_initial_scene(laws, scene, ratio * guess)
+    sought = _select_free_parameters(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.loading_steps))
     measure = Fit(
         records=records,
@@ -306,11 +306,11 @@ def fit(
         slip_distance_2_guess=10.0 * guess,
         step=numbers[0],
         together=there if together else (),
-        before=_to_micrometres("before", before),
-        after=_to_micrometres("after", after),
+        before=_convert_to_micrometres("before", before),
+        after=_convert_to_micrometres("after", after),
         noise=noise,
         loading=loading,
-        filter=_find_common_filter(records, _describe_filter(averaging, low_pass)),
+        filter=_find_common_filter(records, _format_filter_as_string(averaging, low_pass)),
         posterior=posterior,
         machine_stiffness=machine,
         stiffness_relative_stderr=stiffness_error,
@@ -389,7 +389,7 @@ def _guess_slip_distance(
 ) -> float:
     """Return the initial guess of the slip distance in um."""
     if stated_slip_distance is not None:
-        return _to_micrometres("slip_distance", stated_slip_distance)
+        return _convert_to_micrometres("slip_distance", stated_slip_distance)
     if rig is not None:
         return float(rig.slip_distance * 1e6)
     begins = record.loading_steps[step_number - 1].start
@@ -399,7 +399,7 @@ def _guess_slip_distance(
     )
 
 
-def _initial_stiffness(
+def _find_initial_stiffness(
     rig: Rig | None,
     stated_stiffness: Any,
     free_parameters: Sequence[str],
@@ -419,8 +419,8 @@ def _initial_stiffness(
     relative_stderr : float
         Relative standard error of a stiffness that is measured in the records, or 0.
     """
-    if stated_stiffness == STIFFNESS_FROM_RECORD:
-        return _measure_stiffness(records)
+    if stated_stiffness == STIFFNESS_OPTION_FROM_RECORD:
+        return _measure_stiffness_in_records(records)
     if stated_stiffness is None:
         if rig is not None and rig.stiffness is not None:
             return 0.0, float(rig.stiffness * 1e-6), 0.0
@@ -452,7 +452,7 @@ def _initial_stiffness(
     return 0.0, found, 0.0
 
 
-def _measure_stiffness(records: Sequence[Record]) -> tuple[float, float, float]:
+def _measure_stiffness_in_records(records: Sequence[Record]) -> tuple[float, float, float]:
     """Measure the stiffness in the records.
 
     Returns
@@ -479,7 +479,7 @@ def _measure_stiffness(records: Sequence[Record]) -> tuple[float, float, float]:
             "Pass the stiffness as a quantity, for example '1.6e-3 1/um', or fit the "
             "stiffness: --free (free=)."
         )
-        raise InvalidValue("stiffness", STIFFNESS_FROM_RECORD, rule, remedy=remedy)
+        raise InvalidValue("stiffness", STIFFNESS_OPTION_FROM_RECORD, rule, remedy=remedy)
     value, stderr = compute_weighted_mean(*found.T)
     return (0.0, value, stderr / value) if stressed else (value, 0.0, stderr / value)
 
@@ -511,16 +511,18 @@ def _add_normal_stress_of_rig(record: Record, rig: Rig | None) -> Record:
     return replace(record, columns={**record.columns, "normal_stress": stress})
 
 
-def _initial_scene(laws: Sequence[str], scene_fields: Mapping[str, Any], stiffness: float) -> Scene:
+def _build_initial_scene(
+    laws: Sequence[str], scene_fields: Mapping[str, Any], stiffness: float
+) -> Scene:
     """Return the scene with the initial guesses of all parameters."""
     effects = (
-        _INITIAL_FIELDS_OF_TWO_STATE_LAW
+        _INITIAL_GUESS_FOR_TWO_STATE_LAWS
         if str(laws[0]).startswith("two_")
-        else _INITIAL_FIELDS_OF_ONE_STATE_LAW
+        else _INITIAL_GUESS_FOR_ONE_STATE_LAWS
     )
     return Scene(
         **{
-            **_INITIAL_SCENE_FIELDS,
+            **_INITIAL_GUESS_OF_SCENE_FIELDS,
             **effects,
             "law": laws[0],
             "stiffness": stiffness,
@@ -529,7 +531,7 @@ def _initial_scene(laws: Sequence[str], scene_fields: Mapping[str, Any], stiffne
     )
 
 
-def _free_parameters(
+def _select_free_parameters(
     stated_parameters: Sequence[str], laws: Sequence[str], scene: Scene
 ) -> tuple[str, ...]:
     """Return the free parameters that exist in at least one of the laws.
@@ -564,7 +566,7 @@ def _free_parameters(
     return shared
 
 
-def _describe_filter(averaging: Any, low_pass: str) -> str:
+def _format_filter_as_string(averaging: Any, low_pass: str) -> str:
     """Return the friction filter in the string format used by ``Fit``.
 
     The string contains the type of the filter and its duration in s or frequency in Hz. The string
@@ -614,7 +616,7 @@ def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
     return filters.pop()
 
 
-def _to_micrometres(argument_name: str, value: Any) -> float:
+def _convert_to_micrometres(argument_name: str, value: Any) -> float:
     """Convert a length to um. A number without units is assumed to be in um."""
     return (
         float(value)

@@ -8,17 +8,17 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.execution import provenance_attributes
+from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, fitted_fields
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.reporting import split_into_single_fits
 from rsfstudy.rig import Rig
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
-from rsfstudy.storage import StoredDataset, build_scene_from_stored
+from rsfstudy.storage import StoredDataset, build_scene_from_stored_fields
 
 
-def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
+def _select_single_fit(dataset: xr.Dataset) -> xr.Dataset:
     """Return the fit of a dataset, or raise ``InvalidValue`` if there are several."""
     found = split_into_single_fits(dataset)
     if len(found) != 1:
@@ -27,7 +27,7 @@ def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
     return found[0]
 
 
-def sample_parameters(
+def sample_fitted_parameters(
     dataset: xr.Dataset, sample_count: int, seed: int = 0, *, posterior: bool = False
 ) -> xr.Dataset:
     """Draw samples of the parameters of a fit.
@@ -57,7 +57,7 @@ def sample_parameters(
         If the dataset contains several fits, if ``sample_count`` is not a positive integer, if the
         covariance matrix is not finite, or if there are fewer posterior draws than samples.
     """
-    one = _require_single_fit(dataset)
+    one = _select_single_fit(dataset)
     if not isinstance(sample_count, int) or sample_count < 1:
         raise InvalidValue("n", sample_count, "must be a whole number, 1 or more")
     rng = np.random.default_rng(seed)
@@ -83,7 +83,7 @@ def sample_parameters(
     about = {
         "title": "Samples of the parameters of a fit",
         "Conventions": "CF-1.11",
-        **provenance_attributes("dataset.rsf.sample_parameters"),
+        **build_provenance_attributes("dataset.rsf.sample_parameters"),
     }
     return copy_with_cf_encoding(
         xr.Dataset(data, {"draw": ("draw", np.arange(sample_count), number)}, about)
@@ -127,7 +127,7 @@ def _select_posterior_draws(
     return draws[np.sort(rng.choice(len(draws), sample_count, replace=False))]
 
 
-def fitted_scene(dataset: xr.Dataset) -> Scene:
+def build_fitted_scene(dataset: xr.Dataset) -> Scene:
     """Return the scene of a fit with the fitted parameters.
 
     The scene contains a single step of the load point velocity. Quantities are normalised by the
@@ -143,9 +143,9 @@ def fitted_scene(dataset: xr.Dataset) -> Scene:
     Scene
         Scene of the fit.
     """
-    one = _require_single_fit(dataset)
+    one = _select_single_fit(dataset)
     declared = StoredDataset(dataset).declaration
-    first = build_scene_from_stored(declared.base)
+    first = build_scene_from_stored_fields(declared.base)
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))
     distances = (
@@ -158,7 +158,7 @@ def fitted_scene(dataset: xr.Dataset) -> Scene:
     return first.with_(**fields, load_velocity_ratio=after / before)
 
 
-def fitted_rig(dataset: xr.Dataset) -> Rig:
+def build_fitted_rig(dataset: xr.Dataset) -> Rig:
     """Return the rig of a fit.
 
     Parameters
@@ -177,7 +177,7 @@ def fitted_rig(dataset: xr.Dataset) -> Rig:
     InvalidValue
         If the record has no normal stress.
     """
-    one, slider = _require_single_fit(dataset), fitted_scene(dataset)
+    one, slider = _select_single_fit(dataset), build_fitted_scene(dataset)
     stress = one["normal_stress_before"].item() if "normal_stress_before" in one else math.nan
     if not stress > 0.0:
         remedy = (

@@ -11,18 +11,22 @@ import xarray as xr
 from rsfstudy.api.motion_events import InterpolatedMotionRows
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.execution import provenance_attributes
+from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.fitting import MAX_HOLD_OVER_SLIDING_VELOCITY, Record, build_hold_table
 from rsfstudy.rig import read_record
 
 #: Variables of a motion from which healing is measured.
-_MOTION_VARIABLES = ("log10_slip_rate", "load_point_displacement", "friction_coefficient")
+_MOTION_VARIABLES_FOR_HEALING = (
+    "log10_slip_rate",
+    "load_point_displacement",
+    "friction_coefficient",
+)
 #: Friction has a peak if friction falls after its maximum by more than this multiple of the
 #: relative tolerance of the motion.
-_MIN_FALL_AFTER_PEAK_OVER_RTOL = 10.0
+_MIN_FRICTION_FALL_OVER_RTOL = 10.0
 #: Largest relative difference between load point velocities that are treated as equal, because the
 #: difference is due to rounding.
-_VELOCITY_ROUNDING = 1e-6
+_RTOL_OF_EQUAL_VELOCITIES = 1e-6
 
 
 @error_boundary
@@ -70,7 +74,7 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
     if isinstance(record, Record):
         table, name = record.holds(), record.name
     elif hasattr(record, "data_vars"):
-        table, name = measure_motion_holds(record), "motion"
+        table, name = measure_holds_of_motion(record), "motion"
     else:
         remedy = "Pass a record from rsfstudy.read_record, the path of its file, or a motion."
         raise InvalidValue("record", record, "must be a record or a motion", remedy=remedy)
@@ -78,10 +82,10 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
         remedy = "If the steps are not detected, specify them: record.with_steps([...])."
         rule = "has no hold of the load point between sliding and reloading"
         raise InvalidValue("record", name, rule, remedy=remedy)
-    return table.assign_attrs(provenance_attributes("rsfstudy.healing"))
+    return table.assign_attrs(build_provenance_attributes("rsfstudy.healing"))
 
 
-def measure_motion_holds(motion: xr.Dataset) -> xr.Dataset:
+def measure_holds_of_motion(motion: xr.Dataset) -> xr.Dataset:
     """Measure frictional healing and relaxation during the holds of a motion.
 
     Parameters
@@ -99,19 +103,22 @@ def measure_motion_holds(motion: xr.Dataset) -> xr.Dataset:
     DataError
         If the dataset is not a motion.
     """
-    for name in ("time", *_MOTION_VARIABLES):
+    for name in ("time", *_MOTION_VARIABLES_FOR_HEALING):
         if name not in motion or motion[name].dims != ("time",):
             reason = "does not have the dimension time" if name in motion else "is missing"
             raise DataError(f"{name} {reason}. Pass a motion from rsfstudy.simulate.")
-    time, values = motion["time"].values, np.column_stack([motion[n] for n in _MOTION_VARIABLES])
+    time, values = (
+        motion["time"].values,
+        np.column_stack([motion[n] for n in _MOTION_VARIABLES_FOR_HEALING]),
+    )
     rows = InterpolatedMotionRows(time, values, 0.0)
-    least = _MIN_FALL_AFTER_PEAK_OVER_RTOL * float(motion.attrs.get("rtol", 0.0))
+    least = _MIN_FRICTION_FALL_OVER_RTOL * float(motion.attrs.get("rtol", 0.0))
     initial = float(motion.get("slip_rate", 10.0 ** motion["log10_slip_rate"])[0])
     segments = _find_constant_velocity_segments(time, values[:, 1], initial)
     found = [
         (
             (time[first], time[last] - time[first], before, after),
-            *_measure_motion_hold(rows, values, (first, last, end), least),
+            *_measure_hold_of_motion(rows, values, (first, last, end), least),
         )
         for (_, _, before), (first, last, load), (_, end, after) in zip(
             segments, segments[1:], segments[2:], strict=False
@@ -121,16 +128,16 @@ def measure_motion_holds(motion: xr.Dataset) -> xr.Dataset:
     exact = np.array([of[0] for of in found]).reshape(-1, 4)
     numbers, errors = (np.array([of[n] for of in found]).reshape(-1, 5) for n in (1, 2))
     table = build_hold_table(exact, numbers, errors, np.diag(errors[:, 2] ** 2), "error")
-    return _with_units_of_motion(table, motion).assign_attrs(
+    return _add_units_of_motion(table, motion).assign_attrs(
         title="Holds of a motion", Conventions="CF-1.11"
     )
 
 
-def _measure_motion_hold(
-    rows: InterpolatedMotionRows,
-    values: np.ndarray,
-    row_numbers: tuple[int, int, int],
-    min_fall: float,
+def _measure_hold_of_motion(
+    interpolated_rows: InterpolatedMotionRows,
+    motion_values: np.ndarray,
+    hold_row_numbers: tuple[int, int, int],
+    min_friction_fall: float,
 ) -> tuple[list[float], list[float]]:
     """Measure a hold of a motion.
 
@@ -144,15 +151,15 @@ def _measure_motion_hold(
         Friction before the hold, peak friction, healing, relaxation and peak displacement, with
         their interpolation errors.
     """
-    first, last, end = row_numbers
-    moved, friction = values[:, 1], values[:, 2]
+    first, last, end = hold_row_numbers
+    moved, friction = motion_values[:, 1], motion_values[:, 2]
     level = float(friction[first])
     relaxed = float(friction[last]) - level
     falls = np.flatnonzero(np.diff(friction[last : end + 1]) < 0.0)
     if len(falls):
         top = last + int(falls[0])
-        peak, error = rows.find_extreme(top, 2, 1.0)
-        if peak[2] - friction[top : end + 1].min() > min_fall:
+        peak, error = interpolated_rows.find_extreme_near_row(top, 2, 1.0)
+        if peak[2] - friction[top : end + 1].min() > min_friction_fall:
             numbers = [level, peak[2], peak[2] - level, relaxed, peak[1] - moved[last]]
             return numbers, [0.0, error[2], error[2], 0.0, error[1]]
     return [level, np.nan, np.nan, relaxed, np.nan], [0.0, np.nan, np.nan, 0.0, np.nan]
@@ -177,7 +184,9 @@ def _find_constant_velocity_segments(
     rounding = 4.0 * np.spacing(np.abs(displacement).max()) / np.where(moves, lasts, 1.0)
     found = [(0, 0, initial_velocity)]
     for row in np.flatnonzero(moves).tolist():
-        same = abs(velocity[row] - found[-1][2]) <= _VELOCITY_ROUNDING * fastest + rounding[row]
+        same = (
+            abs(velocity[row] - found[-1][2]) <= _RTOL_OF_EQUAL_VELOCITIES * fastest + rounding[row]
+        )
         if same and len(found) > 1:
             found[-1] = found[-1][0], row + 1, found[-1][2]
         else:
@@ -185,12 +194,12 @@ def _find_constant_velocity_segments(
     return found
 
 
-def _with_units_of_motion(table: xr.Dataset, motion: xr.Dataset) -> xr.Dataset:
+def _add_units_of_motion(hold_table: xr.Dataset, motion: xr.Dataset) -> xr.Dataset:
     """Return a table of holds in the units of a motion."""
     time, moved = (motion[name].attrs for name in ("time", "load_point_displacement"))
     rate = motion["slip_rate"].attrs if "slip_rate" in motion else {"units": "1", "scale": "V_*"}
     sources = {"begins": time, "duration": time, "velocity_before": rate, "velocity_after": rate}
     sources |= {"peak_displacement": moved, "peak_displacement_error": moved}
     for name, about in sources.items():
-        table[name].attrs |= {key: about[key] for key in ("units", "scale") if key in about}
-    return table
+        hold_table[name].attrs |= {key: about[key] for key in ("units", "scale") if key in about}
+    return hold_table

@@ -21,24 +21,24 @@ from urllib.parse import quote
 import xarray as xr
 
 from rsfstudy.api import study_runs
-from rsfstudy.api.result_paths import output_directory
+from rsfstudy.api.result_paths import parse_output_path
 from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import check_regular_file, error_boundary, format_exception
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, shorten_text
-from rsfstudy.execution import provenance_attributes
-from rsfstudy.formatting import format_overrides, pluralize
+from rsfstudy.execution import build_provenance_attributes
+from rsfstudy.formatting import format_count_with_noun, format_overrides
 from rsfstudy.quantities import HtmlMarkup
 from rsfstudy.reporting import (
     SummaryTableOrSentence,
     TextTable,
+    build_claims_table,
+    build_failed_cells_table,
     build_summary_tables_and_sentences,
-    claims_table,
+    contains_fits,
+    count_cells_by_status,
     count_pending_cells,
-    count_statuses,
     describe_dataset_origin,
-    failures_table,
-    is_fit,
-    summarise_verdicts,
+    summarise_verdicts_and_failures,
 )
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset, read_dataset
@@ -50,10 +50,10 @@ _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 @dataclass(frozen=True)
-class _ResultSection:
+class _ReportSectionOfFile:
     """Report section about one results file, with the summary row of the file."""
 
-    path: Path
+    results_path: Path
     title: str = ""
     verdicts_summary: str = ""
     status_text: str = Status.OK.label
@@ -61,9 +61,9 @@ class _ResultSection:
     html_parts: tuple[str, ...] = ()
 
     @property
-    def anchor(self) -> str:
+    def html_anchor(self) -> str:
         """HTML anchor of the section. The row of the summary links to the anchor."""
-        return re.sub(r"\W+", "-", self.path.name)
+        return re.sub(r"\W+", "-", self.results_path.name)
 
 
 @error_boundary
@@ -114,10 +114,10 @@ def report(
     >>> page.name
     'report.html'
     """
-    return write_report(directory, output)[0]
+    return write_html_report(directory, output)[0]
 
 
-def write_report(
+def write_html_report(
     directory: str | Path, output: str | Path | None = None
 ) -> tuple[Path, list[Path]]:
     """Write a report, and return its path and the unreadable files.
@@ -145,10 +145,10 @@ def write_report(
     """
     from rsfstudy.plots import write_image
 
-    place = output_directory(directory)
+    place = parse_output_path(directory)
     if place is None or not place.is_dir():
         raise InvalidValue("directory", str(directory), "does not exist or is not a directory")
-    page = place / "report.html" if output is None else output_directory(output)
+    page = place / "report.html" if output is None else parse_output_path(output)
     if page is None or page.suffix != ".html" or page.is_dir():
         raise InvalidValue("output", str(output), "must be a path with the suffix .html")
     check_regular_file("output", page)
@@ -162,17 +162,19 @@ def write_report(
         if not files:
             raise DataError(f"{shorten_text(place)} contains no results (.nc or .zarr).")
         found = [_build_section_of_file(file, page.parent) for file in files]
-        write_image(_build_page(place, found).encode(), page)
+        write_image(_build_html_page(place, found).encode(), page)
     except OSError as error:
         raise DataError(f"{shorten_text(page)} cannot be written ({error})") from error
-    return page, [one.path for one in found if one.title == _UNREADABLE_FILE_STATUS]
+    return page, [one.results_path for one in found if one.title == _UNREADABLE_FILE_STATUS]
 
 
-def _build_page(directory: Path, file_sections: list[_ResultSection]) -> str:
+def _build_html_page(directory: Path, file_sections: list[_ReportSectionOfFile]) -> str:
     """Return the HTML text of the page."""
     rows = [
         {
-            "results": HtmlMarkup(f'<a href="#{one.anchor}">{_escape(one.path.stem)}</a>'),
+            "results": HtmlMarkup(
+                f'<a href="#{one.html_anchor}">{_escape_for_html(one.results_path.stem)}</a>'
+            ),
             "title": one.title,
             "claims": one.verdicts_summary or "-",
             "status": one.status_text,
@@ -180,25 +182,29 @@ def _build_page(directory: Path, file_sections: list[_ResultSection]) -> str:
         for one in file_sections
     ]
     colours = [one.status_colour for one in file_sections]
-    summary = TextTable(rows, wrappable_columns={"title", "claims", "status"}, row_colours=colours)
-    made = provenance_attributes("rsfstudy report")
+    summary = TextTable(
+        rows, wrappable_columns={"title", "claims", "status"}, last_cell_colours=colours
+    )
+    made = build_provenance_attributes("rsfstudy report")
     when, by = made["history"].split()[0], made["source"].partition(",")[0]
     sections = (
-        f'<section id="{one.anchor}">\n<h2>{_escape(one.path.stem)}: {_escape(one.title)}</h2>\n'
+        f'<section id="{one.html_anchor}">\n<h2>{_escape_for_html(one.results_path.stem)}: {_escape_for_html(one.title)}</h2>\n'
         + "\n".join(one.html_parts)
         + "\n</section>"
         for one in file_sections
     )
     page = Template(resources.files(__package__).joinpath("report.html").read_text("utf-8"))
     return page.substitute(
-        title=f"Results in {_escape(directory.resolve().name)}",
-        made=_escape(f"{pluralize(len(file_sections), 'file')}, read by {by}, {when}"),
-        summary=f"<nav>{_format_summary_piece_as_html(summary)}</nav>",
+        title=f"Results in {_escape_for_html(directory.resolve().name)}",
+        made=_escape_for_html(
+            f"{format_count_with_noun(len(file_sections), 'file')}, read by {by}, {when}"
+        ),
+        summary=f"<nav>{_format_table_or_sentence_as_html(summary)}</nav>",
         sections="\n".join(sections),
     )
 
 
-def _build_section_of_file(results_path: Path, page_directory: Path) -> _ResultSection:
+def _build_section_of_file(results_path: Path, page_directory: Path) -> _ReportSectionOfFile:
     """Build the section of a results file.
 
     If the file cannot be read, the section contains the reason.
@@ -209,25 +215,25 @@ def _build_section_of_file(results_path: Path, page_directory: Path) -> _ResultS
             found = _build_section_of_dataset(results_path, read_dataset(results_path))
         except Exception as error:  # Damaged files raise many types of exceptions.
             why = str(error) if isinstance(error, RsfStudyError) else format_exception(error)
-            found = _ResultSection(
+            found = _ReportSectionOfFile(
                 results_path,
                 _UNREADABLE_FILE_STATUS,
                 "",
                 _UNREADABLE_FILE_STATUS,
                 "red",
-                (_html_paragraph(why, "red"),),
+                (_format_html_paragraph(why, "red"),),
             )
     remarks = {str(one.message) for one in caught if issubclass(one.category, UserWarning)}
     links = _format_file_links_as_html(results_path, page_directory)
     return replace(
-        found, html_parts=(*found.html_parts, *map(_html_paragraph, sorted(remarks)), links)
+        found, html_parts=(*found.html_parts, *map(_format_html_paragraph, sorted(remarks)), links)
     )
 
 
-def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _ResultSection:
+def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _ReportSectionOfFile:
     """Build the section of a dataset."""
     title = str(dataset.attrs.get("title", "result for one scene"))
-    numbers = dataset_html(dataset)
+    numbers = format_dataset_as_html(dataset)
     # The module uses the accessor without an import, because the accessor imports this module.
     if StoredDataset(dataset).is_of_single_scene:
         figure = (
@@ -237,37 +243,39 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
         )
         status = Status[str(dataset.attrs["status"]).upper()]
         colour = "green" if status is Status.OK else "yellow" if status.is_answer else "red"
-        return _ResultSection(
+        return _ReportSectionOfFile(
             results_path, title, "", status.label.replace("_", " "), colour, (figure, numbers)
         )
     about = StoredDataset(dataset).declaration
-    parts = [_format_summary_piece_as_html(about.summary)] if about.summary else []
+    parts = [_format_table_or_sentence_as_html(about.summary)] if about.summary else []
     if about.overrides:
-        parts.append(_html_paragraph(f"Overrides: {format_overrides(about.overrides)}", "yellow"))
+        parts.append(
+            _format_html_paragraph(f"Overrides: {format_overrides(about.overrides)}", "yellow")
+        )
     parts += [_format_figure_as_html(results_path, dataset.rsf.plot), numbers]
-    verdicts, wrong = summarise_verdicts(dataset, study_runs.check(dataset))
+    verdicts, wrong = summarise_verdicts_and_failures(dataset, study_runs.check(dataset))
     if undone := count_pending_cells(dataset):
         wrong.append(f"{undone} cells not yet computed")
-    failed = failures_table(dataset, results_path.name)
+    failed = build_failed_cells_table(dataset, results_path.name)
     if failed.rows:
-        lines = _escape("\n".join(row["command"] for row in failed.values))
+        lines = _escape_for_html("\n".join(row["command"] for row in failed.unformatted_rows))
         parts.append(
-            f"<h3>Failures</h3>\n{_format_summary_piece_as_html(failed)}<pre>{lines}</pre>"
+            f"<h3>Failures</h3>\n{_format_table_or_sentence_as_html(failed)}<pre>{lines}</pre>"
         )
     parts.append(
-        f"<h3>Provenance</h3>\n{_format_summary_piece_as_html(describe_dataset_origin(dataset))}"
+        f"<h3>Provenance</h3>\n{_format_table_or_sentence_as_html(describe_dataset_origin(dataset))}"
     )
-    found = _ResultSection(results_path, title, verdicts, html_parts=tuple(parts))
+    found = _ReportSectionOfFile(results_path, title, verdicts, html_parts=tuple(parts))
     if wrong:
         return replace(found, status_text=", ".join(wrong), status_colour="red")
-    counts = count_statuses(dataset)
-    if (len(counts) > 1 and is_fit(dataset)) or Status.OK.label not in counts:
+    counts = count_cells_by_status(dataset)
+    if (len(counts) > 1 and contains_fits(dataset)) or Status.OK.label not in counts:
         ended = ", ".join(f"{count} {label}" for label, count in counts.items())
         return replace(found, status_text=ended.replace("_", " "), status_colour="yellow")
     return found
 
 
-def dataset_html(dataset: xr.Dataset) -> str:
+def format_dataset_as_html(dataset: xr.Dataset) -> str:
     """Return the summary of a dataset as HTML.
 
     Parameters
@@ -281,47 +289,60 @@ def dataset_html(dataset: xr.Dataset) -> str:
         HTML with the tables of the summary. The results of a study are followed by the verdicts of
         the claims, and other datasets are followed by their provenance.
     """
-    parts = list(map(_format_summary_piece_as_html, build_summary_tables_and_sentences(dataset)))
+    parts = list(
+        map(_format_table_or_sentence_as_html, build_summary_tables_and_sentences(dataset))
+    )
     if StoredDataset(dataset).is_of_single_scene:
-        parts.append(_format_summary_piece_as_html(describe_dataset_origin(dataset)))
-    elif claimed := claims_table(study_runs.check(dataset)):
-        parts += ["<h3>Claims</h3>", _format_summary_piece_as_html(claimed)]
+        parts.append(_format_table_or_sentence_as_html(describe_dataset_origin(dataset)))
+    elif claimed := build_claims_table(study_runs.check(dataset)):
+        parts += ["<h3>Claims</h3>", _format_table_or_sentence_as_html(claimed)]
     return "\n".join(filter(None, parts))
 
 
 # ---- elements of HTML ----------------------------------------------------------------------------
 
 
-def _escape(text: object) -> str:
+def _escape_for_html(text: object) -> str:
     """Escape a string and its control characters for HTML."""
     return HtmlMarkup.escape(text)
 
 
-def _html_paragraph(text: str, colour: str = "") -> str:
+def _format_html_paragraph(text: str, colour: str = "") -> str:
     """Return a string as an HTML paragraph."""
-    return f'<p class="{colour}">{_escape(text)}</p>'
+    return f'<p class="{colour}">{_escape_for_html(text)}</p>'
 
 
-def _format_summary_piece_as_html(piece: SummaryTableOrSentence) -> str:
+def _format_table_or_sentence_as_html(table_or_sentence: SummaryTableOrSentence) -> str:
     """Format a sentence, a mapping or a table as HTML.
 
     A wide table is placed in a scrollable box. If the mapping or the table is empty, the function
     returns an empty string.
     """
-    if isinstance(piece, str):
-        return _html_paragraph(piece)
-    if not isinstance(piece, TextTable):
-        rows = (f"<dt>{_escape(n)}</dt><dd>{_escape(value)}</dd>" for n, value in piece.items())
-        return f"<dl>{''.join(rows)}</dl>" if piece else ""
+    if isinstance(table_or_sentence, str):
+        return _format_html_paragraph(table_or_sentence)
+    if not isinstance(table_or_sentence, TextTable):
+        rows = (
+            f"<dt>{_escape_for_html(n)}</dt><dd>{_escape_for_html(value)}</dd>"
+            for n, value in table_or_sentence.items()
+        )
+        return f"<dl>{''.join(rows)}</dl>" if table_or_sentence else ""
     rows_ = []
-    for row, colour in zip(piece.rows, piece.row_colours or [""] * len(piece.rows), strict=True):
-        whole = {head: "" if head in piece.wrappable_columns else "whole" for head in row}
+    for row, colour in zip(
+        table_or_sentence.rows,
+        table_or_sentence.last_cell_colours or [""] * len(table_or_sentence.rows),
+        strict=True,
+    ):
+        whole = {
+            head: "" if head in table_or_sentence.wrappable_columns else "whole" for head in row
+        }
         whole[list(row)[-1]] += f" {colour}"
-        texts = {head: c if isinstance(c, HtmlMarkup) else _escape(c) for head, c in row.items()}
+        texts = {
+            head: c if isinstance(c, HtmlMarkup) else _escape_for_html(c) for head, c in row.items()
+        }
         rows_.append([HtmlMarkup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
-    caption = _html_paragraph(piece.caption) if piece.caption else ""
+    caption = _format_html_paragraph(table_or_sentence.caption) if table_or_sentence.caption else ""
     return (
-        f'{caption}<div class="wide">{HtmlMarkup.table(list(piece.rows[0]), rows_)}</div>'
+        f'{caption}<div class="wide">{HtmlMarkup.format_table(list(table_or_sentence.rows[0]), rows_)}</div>'
         if rows_
         else ""
     )
@@ -344,20 +365,22 @@ def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -
             with style_context(None):
                 image = render_figure(draw_figure(), "png")
     except Exception as error:  # The report shows the numbers even if the figure fails.
-        return _html_paragraph(f"no figure: {error}", "yellow")
+        return _format_html_paragraph(f"no figure: {error}", "yellow")
     data = base64.b64encode(image).decode()
-    inches = _png_width_in_inches(image)
-    about = f'alt="{_escape(f"figure of {results_path.stem}")}" style="--inches: {inches:.3g}"'
+    inches = _read_png_width_in_inches(image)
+    about = (
+        f'alt="{_escape_for_html(f"figure of {results_path.stem}")}" style="--inches: {inches:.3g}"'
+    )
     return f'<figure><img {about} src="data:image/png;base64,{data}"></figure>'
 
 
-def _png_width_in_inches(image: bytes) -> float:
+def _read_png_width_in_inches(png_bytes: bytes) -> float:
     """Return the width in inches at which a PNG image is printed.
 
     The page scales all figures by this width, so that text has the same size in all figures.
     """
-    at = image.find(b"pHYs") + 4
-    pixels, per_metre = (int.from_bytes(image[n : n + 4]) for n in (16, at))
+    at = png_bytes.find(b"pHYs") + 4
+    pixels, per_metre = (int.from_bytes(png_bytes[n : n + 4]) for n in (16, at))
     return pixels / per_metre / 0.0254 if at > 3 and per_metre else 100.0
 
 
@@ -376,7 +399,7 @@ def _format_file_links_as_html(results_path: Path, page_directory: Path) -> str:
     files = [file for ending in endings if (file := results_path.with_suffix(ending)).exists()]
     linked = (
         f'<a href="{quote(Path(os.path.relpath(file, page_directory)).as_posix())}">'
-        f"{_escape(file.name)}</a>"
+        f"{_escape_for_html(file.name)}</a>"
         for file in files
     )
     return f"<p>Files: {', '.join(linked)}</p>"

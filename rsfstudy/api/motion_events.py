@@ -21,7 +21,7 @@ from rsfstudy.slider import Scene
 #: Limit of the ratio of slip rate to load point velocity. An event begins when the ratio exceeds
 #: the limit. In steady sliding, the ratio is 1. If a stable slider overshoots after a step of the
 #: load point velocity, the ratio remains below the limit.
-_EVENT_SLIP_RATE_OVER_LOAD_VELOCITY = 10.0
+_MIN_EVENT_SLIP_RATE_OVER_LOAD_VELOCITY = 10.0
 #: Number of rows that the interpolating polynomial uses, and number of rows that a second
 #: polynomial uses to estimate the interpolation error. A motion has six rows per integration step.
 _ROWS_PER_INTERPOLANT, _ROWS_PER_ERROR_CHECK_INTERPOLANT = 6, 4
@@ -31,11 +31,11 @@ _MAX_JUMP_DURATION_IN_FLOAT_SPACINGS = 16
 #: Maximum change of log10 slip rate between rows that are interpolated. In motions with a tolerance
 #: of 1e-4, log10 slip rate changes by up to 0.37 between neighbouring rows, except at the sudden
 #: beginning or end of a rupture.
-_MAX_LOG10_SLIP_RATE_STEP = 0.5
+_MAX_LOG10_SLIP_RATE_CHANGE_PER_ROW = 0.5
 
 
 def find_motion_events(
-    motion: xr.Dataset, slip_rate: float | None, scene: Callable[[], Scene]
+    motion: xr.Dataset, slip_rate_threshold: float | None, scene: Callable[[], Scene]
 ) -> xr.Dataset:
     """Find the events of a motion.
 
@@ -68,26 +68,34 @@ def find_motion_events(
             reason = "does not have the dimension time" if name in motion else "is missing"
             raise DataError(f"{name} {reason}. Pass a motion from rsfstudy.simulate.")
     times, *rest = (np.asarray(motion[name], dtype=float) for name in names)
-    arrest = _arrest_level(motion, scene)
-    if slip_rate is None:
+    arrest = _find_log10_arrest_slip_rate(motion, scene)
+    if slip_rate_threshold is None:
         loads = [segment.load_velocity for segment in scene().parts.loading.segments]
-        slip_rate = _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY * max([1.0, *loads])
-    if not 0.0 < slip_rate < math.inf:
-        raise InvalidValue("slip_rate", slip_rate, "must be positive and finite (in units of V_*)")
-    rows = InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate), arrest)
-    found = [rows.measure_event(*ends) for ends in rows.iterate_event_row_spans()]
+        slip_rate_threshold = _MIN_EVENT_SLIP_RATE_OVER_LOAD_VELOCITY * max([1.0, *loads])
+    if not 0.0 < slip_rate_threshold < math.inf:
+        raise InvalidValue(
+            "slip_rate", slip_rate_threshold, "must be positive and finite (in units of V_*)"
+        )
+    rows = InterpolatedMotionRows(
+        times, np.column_stack(rest), math.log10(slip_rate_threshold), arrest
+    )
+    found = [rows.measure_event(*ends) for ends in rows.find_event_row_spans()]
     about = {name: motion[name].attrs for name in names}
-    catalogue = build_event_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
+    catalogue = build_event_catalogue(found, about).assign_attrs(
+        slip_rate_threshold=slip_rate_threshold
+    )
     if "slip_rate" in motion and motion.sizes["time"]:  # The motion has units.
         rate = motion["slip_rate"]
         size = float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0])
         catalogue = catalogue.assign(
-            DatasetUnits(catalogue).slip_rate_from_log("peak_log10_slip_rate", size, rate.units)
+            DatasetUnits(catalogue).compute_slip_rate_from_log(
+                "peak_log10_slip_rate", size, rate.units
+            )
         )
     return catalogue
 
 
-def _arrest_level(motion: xr.Dataset, scene: Callable[[], Scene]) -> float | None:
+def _find_log10_arrest_slip_rate(motion: xr.Dataset, scene: Callable[[], Scene]) -> float | None:
     """Return the logarithm (base 10) of the slip rate at which events end.
 
     In a scene with noise, an event ends when the slip rate falls below the smallest nonzero load
@@ -133,7 +141,7 @@ class InterpolatedMotionRows:
         self._event_slip_rate_level = event_slip_rate_level
         self._arrest_slip_rate_level = arrest_slip_rate_level
 
-    def iterate_event_row_spans(self) -> list[tuple[int, int]]:
+    def find_event_row_spans(self) -> list[tuple[int, int]]:
         """Return the first and the last row of each event above the threshold.
 
         Returns
@@ -176,18 +184,18 @@ class InterpolatedMotionRows:
         top = highest + int(np.argmax(stress[highest : peak + 1]))
         bottom = peak + int(np.argmin(stress[peak : lowest + 1]))
         (begin, slip), begun = (
-            self._find_level_crossing_after_row(first_row - 1)
+            self._find_threshold_crossing_after_row(first_row - 1)
             if first_row
             else self._read_time_and_slip_at_end_row(0)
         )
         (finish, slipped), finished = (
-            self._find_level_crossing_after_row(last_row)
+            self._find_threshold_crossing_after_row(last_row)
             if last_row < end
             else self._read_time_and_slip_at_end_row(end)
         )
-        (rate, _, at_peak), (rate_error, _, peak_error) = self.find_extreme(peak, 0, 1.0)
-        (*_, before), (*_, before_error) = self.find_extreme(top, 2, 1.0)
-        (*_, after), (*_, after_error) = self.find_extreme(bottom, 2, -1.0)
+        (rate, _, at_peak), (rate_error, _, peak_error) = self.find_extreme_near_row(peak, 0, 1.0)
+        (*_, before), (*_, before_error) = self.find_extreme_near_row(top, 2, 1.0)
+        (*_, after), (*_, after_error) = self.find_extreme_near_row(bottom, 2, -1.0)
         cut = (first_row == 0 or highest == 0) + 2 * (last_row == end or lowest == end)
         return {
             "time": (begin, begun[0]),
@@ -221,7 +229,7 @@ class InterpolatedMotionRows:
                 lowest += 1
         return highest, lowest
 
-    def _interpolate_after_row(self, row: int, row_count: int) -> KroghInterpolator:
+    def _build_interpolant_after_row(self, row: int, row_count: int) -> KroghInterpolator:
         """Interpolate the motion near the interval between a row and the next row.
 
         The interpolating polynomial is a function of the time since the first row of the interval.
@@ -245,14 +253,18 @@ class InterpolatedMotionRows:
         Rows are too far apart if slip rate changes by more than half a decade between the rows.
         Rows may be too far apart if the motion was computed at requested times only.
         """
-        return bool(np.abs(np.diff(self._values[rows, 0])).max() > _MAX_LOG10_SLIP_RATE_STEP)
+        return bool(
+            np.abs(np.diff(self._values[rows, 0])).max() > _MAX_LOG10_SLIP_RATE_CHANGE_PER_ROW
+        )
 
     @staticmethod
-    def _interpolant_slope(interpolant: KroghInterpolator, time: float, column: int) -> float:
+    def _compute_interpolant_slope(
+        interpolant: KroghInterpolator, time: float, column: int
+    ) -> float:
         """Return the time derivative of a column of the interpolating polynomial."""
         return float(interpolant.derivative(time)[column])
 
-    def _find_level_crossing_after_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
+    def _find_threshold_crossing_after_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
         """Find the time between two rows at which slip rate crosses the threshold.
 
         Returns
@@ -262,7 +274,7 @@ class InterpolatedMotionRows:
         """
         found = []
         for number in (_ROWS_PER_INTERPOLANT, _ROWS_PER_ERROR_CHECK_INTERPOLANT):
-            through = self._interpolate_after_row(row, number)
+            through = self._build_interpolant_after_row(row, number)
             span = self._times[row + 1] - self._times[row]
             late = brentq(lambda t, p=through: p(t)[0] - self._event_slip_rate_level, 0.0, span)
             found.append([self._times[row] + late, through(late)[1]])
@@ -276,7 +288,9 @@ class InterpolatedMotionRows:
         """Return the time and slip in the first or last row, with zero errors."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
-    def find_extreme(self, row: int, column: int, sign: float) -> tuple[np.ndarray, np.ndarray]:
+    def find_extreme_near_row(
+        self, row: int, column: int, sign: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Find a maximum or a minimum of a column near a row.
 
         Parameters
@@ -301,14 +315,16 @@ class InterpolatedMotionRows:
                 span = self._times[begin + 1] - self._times[begin]
                 if span <= _MAX_JUMP_DURATION_IN_FLOAT_SPACINGS * np.spacing(times[-1]):
                     continue
-                through = self._interpolate_after_row(begin, number)
+                through = self._build_interpolant_after_row(begin, number)
                 if (
-                    self._interpolant_slope(through, 0.0, column)
-                    * self._interpolant_slope(through, span, column)
+                    self._compute_interpolant_slope(through, 0.0, column)
+                    * self._compute_interpolant_slope(through, span, column)
                     < 0.0
                 ):
                     at = brentq(
-                        lambda t, p=through: self._interpolant_slope(p, t, column), 0.0, span
+                        lambda t, p=through: self._compute_interpolant_slope(p, t, column),
+                        0.0,
+                        span,
                     )
                     best = max(best, through(at), key=lambda values: sign * values[column])
             found.append(best)

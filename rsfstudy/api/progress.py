@@ -19,12 +19,15 @@ from rsfstudy.slider import Scene
 #: Maximum number of progress lines of a run, and minimum time in s between two lines.
 _MAX_PROGRESS_LINES, _MIN_PROGRESS_LINE_INTERVAL = 10, 10.0
 #: Minimum estimated time in s of a run whose estimated time is printed.
-_MIN_PRINTED_ESTIMATE = 20.0
+_MIN_REMAINING_SECONDS_TO_PRINT = 20.0
 
 
 @contextlib.contextmanager
 def show_progress(
-    study_name: str, is_shown: bool | ProgressCallback, items: str = "cells", delay: float = 0.0
+    study_name: str,
+    is_shown_or_callback: bool | ProgressCallback,
+    items: str = "cells",
+    delay: float = 0.0,
 ) -> Iterator[ProgressCallback]:
     """Show the progress of a run on standard error, or report it to a function.
 
@@ -47,12 +50,12 @@ def show_progress(
         cells and the remaining time.
     """
     console = Console(stderr=True)
-    if callable(is_shown):
-        yield is_shown
-    elif not is_shown:
+    if callable(is_shown_or_callback):
+        yield is_shown_or_callback
+    elif not is_shown_or_callback:
         yield lambda _done, _all, _remaining: None
     elif not (console.is_terminal or console.is_jupyter):
-        yield _print_progress_lines(study_name, console, items, delay)
+        yield _make_progress_line_printer(study_name, console, items, delay)
     else:
         counts = (bars.MofNCompleteColumn(), bars.TextColumn(items))
         times = (bars.TimeElapsedColumn(), bars.TimeRemainingColumn())
@@ -73,7 +76,7 @@ def show_progress(
             bar.stop()
 
 
-def _print_progress_lines(
+def _make_progress_line_printer(
     study_name: str, console: Console, items: str, delay: float
 ) -> ProgressCallback:
     """Return a function that prints progress lines for log files and pipes.
@@ -96,7 +99,7 @@ def _print_progress_lines(
         left = "" if remaining is None else f", about {format_duration(remaining)} left"
         if now - began < delay:
             return
-        if not is_estimated and (remaining or 0.0) > _MIN_PRINTED_ESTIMATE:
+        if not is_estimated and (remaining or 0.0) > _MIN_REMAINING_SECONDS_TO_PRINT:
             is_estimated = True
             print_line(f"{done:,} of {total:,} {items} are finished{left}")
         if part > told and (
@@ -110,8 +113,8 @@ def _print_progress_lines(
     return update
 
 
-def compile_scenes_with_notice(
-    example_scenes: Sequence[Scene], with_time_variable_flags: Sequence[bool], is_shown: bool
+def compile_equations_with_notice(
+    example_scenes: Sequence[Scene], with_time_variable_flags: Sequence[bool], is_notice_shown: bool
 ) -> None:
     """Compile the equations of scenes, and print the compilation time.
 
@@ -127,10 +130,13 @@ def compile_scenes_with_notice(
     is_shown : bool
         If False, nothing is displayed.
     """
-    console, before = Console(stderr=True, quiet=not is_shown), replace(Engine.compilation_log)
+    console, before = (
+        Console(stderr=True, quiet=not is_notice_shown),
+        replace(Engine.compilation_log),
+    )
     with console.status("compiling the equations ..."):
         for scene, clock in itertools.product(example_scenes, with_time_variable_flags):
-            Engine.import_compiled().compile_equations_of_scene(scene, with_time=clock)
+            Engine.import_compiled_engine().compile_equations_of_scene(scene, with_time=clock)
     programs, seconds = (
         Engine.compilation_log.compiled_program_count - before.compiled_program_count,
         Engine.compilation_log.total_compilation_seconds - before.total_compilation_seconds,

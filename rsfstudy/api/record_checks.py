@@ -60,7 +60,10 @@ def check_displacement_was_not_reset(record: Record) -> None:
 
 
 def check_displacement_is_not_slip(
-    records: Sequence[Record], step_numbers: Sequence[int], ratio: float, machine: float
+    records: Sequence[Record],
+    step_numbers: Sequence[int],
+    stiffness_over_normal_stress: float,
+    machine_stiffness: float,
 ) -> None:
     """Raise an error if the displacement column of a record contains fault slip.
 
@@ -83,7 +86,9 @@ def check_displacement_is_not_slip(
     for record in records:
         stress = record.columns["friction"]
         shortening = (
-            stress * record.columns["normal_stress"] / machine if machine else stress / ratio
+            stress * record.columns["normal_stress"] / machine_stiffness
+            if machine_stiffness
+            else stress / stiffness_over_normal_stress
         )
         ends = [-math.inf, *(step.end for step in record.loading_steps)]
         begins = [*(step.start for step in record.loading_steps[1:]), math.inf, math.inf]

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
-from rsfstudy.path_checks import check_path
-from rsfstudy.study import load_study, study_names
+from rsfstudy.path_checks import check_path_is_valid
+from rsfstudy.study import list_study_names, load_study
 
 
-def output_directory(output: str | Path | None) -> Path | None:
+def parse_output_path(output: str | Path | None) -> Path | None:
     """Convert the argument ``output`` to a path.
 
     Parameters
@@ -32,10 +32,10 @@ def output_directory(output: str | Path | None) -> Path | None:
         return None
     if not isinstance(output, str | Path):
         raise InvalidValue("output", output, "must be a path, or None")
-    return check_path("output", output)
+    return check_path_is_valid("output", output)
 
 
-def find_results(study_or_file: str | Path, output_path: str | Path | None) -> Path:
+def find_results_file(study_or_file: str | Path, output_path: str | Path | None) -> Path:
     """Find the results file of a study.
 
     Parameters
@@ -61,14 +61,14 @@ def find_results(study_or_file: str | Path, output_path: str | Path | None) -> P
     InvalidValue
         If ``study_or_file`` is neither a path nor the name of a study.
     """
-    check_path("study", study_or_file)
+    check_path_is_valid("study", study_or_file)
     path = Path(study_or_file)
     if path.suffix in (".nc", ".zarr"):
         return path
     study = load_study(str(path)).name if path.suffix == ".py" else str(study_or_file)
     try:
-        return _result_path_of_study(
-            study, output_directory(output_path) or Defaults.OUTPUT_DIRECTORY
+        return _find_results_file_of_study(
+            study, parse_output_path(output_path) or Defaults.OUTPUT_DIRECTORY
         )
     except OSError as error:
         raise DataError(
@@ -76,7 +76,7 @@ def find_results(study_or_file: str | Path, output_path: str | Path | None) -> P
         ) from error
 
 
-def _result_path_of_study(study_name: str, output_path: Path) -> Path:
+def _find_results_file_of_study(study_name: str, output_path: Path) -> Path:
     """Return the path of the NetCDF file or Zarr store of a study."""
     file, in_pieces = output_path / f"{study_name}.nc", output_path / f"{study_name}.zarr"
     if file.exists() and in_pieces.exists():
@@ -93,10 +93,10 @@ def _result_path_of_study(study_name: str, output_path: Path) -> Path:
             "again, or pass the path of the incomplete results."
         )
     there = any(file.name.startswith(f"{study_name}.") for file in output_path.glob("*"))
-    if not there and study_name not in study_names():
+    if not there and study_name not in list_study_names():
         rule, remedy = (
             f"has no results in {shorten_text(output_path)}",
             "Results files have the suffix .nc or .zarr.",
         )
-        raise InvalidValue("study", study_name, rule, choices=study_names(), remedy=remedy)
+        raise InvalidValue("study", study_name, rule, choices=list_study_names(), remedy=remedy)
     return file

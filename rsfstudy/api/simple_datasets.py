@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 
 #: Attribute of a simplified dataset with the values of the omitted coordinates as JSON.
-CONSTANTS_ATTRIBUTE = "constants"
+CONSTANT_COORDINATES_ATTRIBUTE = "constants"
 
 
-def simplify_dataset(dataset: xr.Dataset) -> xr.Dataset:
+def omit_constants_and_simplify_units(dataset: xr.Dataset) -> xr.Dataset:
     """Omit constant coordinates, and replace unit attributes by readable units.
 
     Parameters
@@ -28,29 +28,29 @@ def simplify_dataset(dataset: xr.Dataset) -> xr.Dataset:
     constants: dict[str, Any] = {}
     for name, values in dataset.coords.items():
         # A coordinate of a dimension with several points is needed to select the points.
-        if (values.ndim == 0 or name not in dataset.dims) and _is_constant(values):
-            constants[str(name)] = _to_plain_value(values)
+        if (values.ndim == 0 or name not in dataset.dims) and _is_constant_coordinate(values):
+            constants[str(name)] = _read_constant_coordinate_value(values)
     # The copy has variables of its own, so that their attributes can be replaced.
     simple = dataset.drop_vars(list(constants)).copy()
     for name in simple.variables:
-        simple[name].attrs = _replace_units(dataset[name].attrs)
-    return simple.assign_attrs({CONSTANTS_ATTRIBUTE: json.dumps(constants)})
+        simple[name].attrs = _replace_units_by_scale(dataset[name].attrs)
+    return simple.assign_attrs({CONSTANT_COORDINATES_ATTRIBUTE: json.dumps(constants)})
 
 
-def _is_constant(values: xr.DataArray) -> bool:
+def _is_constant_coordinate(coordinate: xr.DataArray) -> bool:
     """Return True if all values of a coordinate are equal or all are missing."""
-    return bool(values.size) and len(np.unique(values.values.astype(str))) == 1
+    return bool(coordinate.size) and len(np.unique(coordinate.values.astype(str))) == 1
 
 
-def _to_plain_value(values: xr.DataArray) -> Any:
+def _read_constant_coordinate_value(coordinate: xr.DataArray) -> Any:
     """Return the value of a constant coordinate as a number, a string or a boolean."""
-    value = values.values.flat[0]
+    value = coordinate.values.flat[0]
     plain = value.item() if hasattr(value, "item") else value
     missing = isinstance(plain, float) and not np.isfinite(plain)
     return None if missing else plain if isinstance(plain, int | float | str) else str(plain)
 
 
-def _replace_units(attributes: dict[Any, Any]) -> dict[Any, Any]:
+def _replace_units_by_scale(attributes: dict[Any, Any]) -> dict[Any, Any]:
     """Return the attributes of a variable with readable units.
 
     The scale of a normalised variable becomes its ``units`` attribute. For a dimensionless variable

@@ -17,7 +17,7 @@ import xarray as xr
 
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import IncompleteWarning, InvalidValue, NoResultWarning, shorten_text
-from rsfstudy.execution import provenance_attributes
+from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.motion import (
     Accuracy,
     Engine,
@@ -26,7 +26,7 @@ from rsfstudy.motion import (
     Integrator,
     MotionStopped,
     Recording,
-    accept_accuracy_and_meter,
+    accept_former_accuracy_and_meter,
     rise,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
@@ -54,7 +54,7 @@ _INSTABILITY_TIME_QUANTITY = Quantity(
 #: Attribute that contains the time after which a motion has no physical meaning.
 BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME = "beyond_instability_norm"
 #: Attribute that contains the time, the slip and the state of the slider at the end of a motion.
-MOTION_END_ATTRIBUTE_NAME = "end"
+MOTION_END_STATE_ATTRIBUTE_NAME = "end"
 #: Limit of the ratio of slip rate to load point velocity. The limit defines instability if the load
 #: point velocity exceeds the limit of the slip rate (instability norm). The load point velocity may
 #: exceed the instability norm if the period of the scene is not the period of the slider.
@@ -72,7 +72,7 @@ _BUILT_IN_REGIME_NAMES = (
 
 
 @error_boundary
-@accept_accuracy_and_meter
+@accept_former_accuracy_and_meter
 def simulate(
     scene: Scene,
     *extra_positional_arguments: Never,
@@ -207,13 +207,13 @@ def simulate(
             "must be passed by name",
             remedy=remedy,
         )
-    check_scene(scene)
-    since = None if start is None else _read_end_of_motion(start, scene)
+    check_is_scene(scene)
+    since = None if start is None else _read_final_state_of_motion(start, scene)
     began = since.time if since else 0.0
     at = _check_requested_times(times, duration, began)
     if at is not None:
         duration = float(at[-1]) - began
-    duration = _loading_duration(scene) - began if duration is None else duration
+    duration = _compute_default_duration(scene) - began if duration is None else duration
     known = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
     if not (known and 0.0 < duration < math.inf):
         remedy = (
@@ -224,7 +224,7 @@ def simulate(
     is_alone = integrator is None
     if integrator is None:
         integrator = Integrator(Accuracy(rtol, budget, engine=engine))
-    check_integrator(integrator)
+    check_integrator_is_usable(integrator)
     if is_alone and not scene.is_perturbed:
         warnings.warn(_UNPERTURBED_SCENE_MESSAGE, NoResultWarning, stacklevel=3)
     spent, by_regime = integrator.evaluations, dict(integrator.work_meter.evaluations_by_regime)
@@ -232,7 +232,7 @@ def simulate(
     status, message, limit, passed = (
         Status.OK,
         "",
-        _log_slip_rate_limit_of_instability(scene),
+        _compute_log_instability_slip_rate(scene),
         math.nan,
     )
     watches = [rise("log_slip_rate", limit)] if limit < math.inf else []
@@ -247,10 +247,10 @@ def simulate(
             raise
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
-            message += integrator.work_meter.budget_advice
+            message += integrator.work_meter.larger_budget_advice
     seen = recording.as_table(scene)
     seen = make_row_times_strictly_increasing(seen) if at is None else seen
-    dataset = _recording_to_dataset(scene, seen, recording.regime_names)
+    dataset = _convert_recording_to_dataset(scene, seen, recording.regime_names)
     dataset = dataset.assign_attrs(
         {
             "title": f"Motion of a spring-slider, {scene.law} law",
@@ -271,11 +271,13 @@ def simulate(
                     for regime, n in integrator.work_meter.evaluations_by_regime.items()
                 }
             ),
-            **provenance_attributes("rsfstudy.simulate"),
+            **build_provenance_attributes("rsfstudy.simulate"),
         }
     )
     if status is Status.OK:
-        dataset.attrs[MOTION_END_ATTRIBUTE_NAME] = json.dumps((last.time, last.slip, last.point))
+        dataset.attrs[MOTION_END_STATE_ATTRIBUTE_NAME] = json.dumps(
+            (last.time, last.slip, last.point)
+        )
     if isinstance(scene.parts.loading, SampledHistory):
         dataset = dataset.assign(
             history_samples=_build_loading_history_variable(scene.parts.loading)
@@ -301,7 +303,7 @@ def simulate(
     return copy_with_cf_encoding(dataset)
 
 
-def check_integrator(integrator: Any) -> None:
+def check_integrator_is_usable(integrator: Any) -> None:
     """Check the integrator of a public function.
 
     Parameters
@@ -320,14 +322,14 @@ def check_integrator(integrator: Any) -> None:
     Engine.check_is_usable(integrator.engine)
 
 
-def _recording_to_dataset(
+def _convert_recording_to_dataset(
     scene: Scene, recorded_rows: np.ndarray, regime_names: Sequence[str]
 ) -> xr.Dataset:
     """Convert a recorded motion to a dataset with the dimension ``time``."""
     fluid = scene.parts.fluid.unknowns
     columns = {
         find_quantity(name): recorded_rows[:, column]
-        for column, name in enumerate(Recording.MOTION_VARIABLES)
+        for column, name in enumerate(Recording.MOTION_VARIABLE_NAMES)
     }
     first = Recording.FIRST_STATE_COLUMN + scene.state_count - len(fluid)
     columns |= {about: recorded_rows[:, first + i] for i, about in enumerate(fluid)}
@@ -342,13 +344,15 @@ def _recording_to_dataset(
             ]
             for i in of_law
         }
-    columns[find_quantity("load_point_displacement")] = Recording.load_point_displacement(
+    columns[find_quantity("load_point_displacement")] = Recording.compute_load_point_displacement(
         scene, recorded_rows
     )
-    columns[find_quantity("friction_coefficient")] = Recording.friction_coefficient(recorded_rows)
+    columns[find_quantity("friction_coefficient")] = Recording.get_friction_coefficient(
+        recorded_rows
+    )
     dataset = xr.Dataset(
         {
-            q.name: ("time", values, motion_variable_attributes(q, scene))
+            q.name: ("time", values, build_motion_variable_attributes(q, scene))
             for q, values in columns.items()
         }
     )
@@ -363,7 +367,7 @@ def _recording_to_dataset(
     return dataset.set_coords(["slip", "reference_rate"])
 
 
-def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, Any]:
+def build_motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, Any]:
     """Return the attributes of a variable of a motion.
 
     If the scene has radiation damping, the radiation damping stress at V_* is subtracted from the
@@ -400,9 +404,9 @@ def _build_state_variable_quantity(state_number: int) -> Quantity:
     return Quantity(f"state_{state_number}", rf"$\Psi_{{{state_number}}}$", "1", about)
 
 
-def _read_end_of_motion(motion: object, scene: Scene) -> Event:
+def _read_final_state_of_motion(motion: object, scene: Scene) -> Event:
     """Return the state of the slider at the end of a stored motion."""
-    if not isinstance(motion, xr.Dataset) or MOTION_END_ATTRIBUTE_NAME not in motion.attrs:
+    if not isinstance(motion, xr.Dataset) or MOTION_END_STATE_ATTRIBUTE_NAME not in motion.attrs:
         remedy = "Pass a motion from simulate that did not end early."
         raise InvalidValue("start", motion, "must be a complete motion", remedy=remedy)
     if json.loads(motion.attrs["scene"]) != json.loads(json.dumps(scene.describe())):
@@ -410,7 +414,7 @@ def _read_end_of_motion(motion: object, scene: Scene) -> Event:
         raise InvalidValue(
             "start", motion.attrs["title"], "must be the scene of the motion", remedy=remedy
         )
-    time, slip, numbers = json.loads(motion.attrs[MOTION_END_ATTRIBUTE_NAME])
+    time, slip, numbers = json.loads(motion.attrs[MOTION_END_STATE_ATTRIBUTE_NAME])
     point = MotionPoint._make(tuple(x) if isinstance(x, list) else x for x in numbers)
     return Event(EventKind.END, None, time, slip, point, "", 0, 0.0)
 
@@ -428,7 +432,7 @@ def _build_loading_history_variable(history: SampledHistory) -> xr.Variable:
     return xr.Variable(("history_sample", "history_column"), history.sample_table, about)
 
 
-def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
+def _compute_log_instability_slip_rate(scene: Scene) -> float:
     """Return the limit of ln(V/V_*) above which a motion is unphysical."""
     if scene.has_mass or scene.dynamics.radiated_stress_slope(0.0):
         return math.inf
@@ -438,7 +442,7 @@ def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
     return norm if norm > fastest else fastest + math.log(_INSTABILITY_SLIP_RATE_OVER_LOAD_RATE)
 
 
-def _loading_duration(scene: Scene) -> float:
+def _compute_default_duration(scene: Scene) -> float:
     """Return the default duration of a motion, given its loading."""
     loading = scene.parts.loading
     stated = float(loading.segment_table[-1][SEGMENT_START])
@@ -485,7 +489,7 @@ def _check_requested_times(
     return at
 
 
-def make_row_times_strictly_increasing(table: np.ndarray) -> np.ndarray:
+def make_row_times_strictly_increasing(recorded_rows: np.ndarray) -> np.ndarray:
     """Return a recorded motion with strictly increasing times.
 
     The first row of a regime (form of the equations of motion) has the same time as the last row of
@@ -506,20 +510,25 @@ def make_row_times_strictly_increasing(table: np.ndarray) -> np.ndarray:
     """
     same = (
         np.diff(
-            np.delete(table, [Recording.REGIME_COLUMN, Recording.SAMPLE_COLUMN], axis=1), axis=0
+            np.delete(
+                recorded_rows, [Recording.REGIME_COLUMN, Recording.SAMPLE_NUMBER_COLUMN], axis=1
+            ),
+            axis=0,
         )
         == 0.0
     ).all(axis=1)
-    table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
-    times, earliest = table[:, 0].tolist(), -math.inf
+    recorded_rows = recorded_rows[
+        ~np.append(same, np.zeros(min(len(recorded_rows), 1), dtype=bool))
+    ]
+    times, earliest = recorded_rows[:, 0].tolist(), -math.inf
     for place, time in enumerate(times):
         times[place] = max(time, earliest)
         earliest = times[place] + max(_MIN_TIME_ULPS * math.ulp(times[place]), _MIN_TIME_DIFFERENCE)
-    table[:, 0] = times
-    return table
+    recorded_rows[:, 0] = times
+    return recorded_rows
 
 
-def check_scene(value: object) -> None:
+def check_is_scene(value: object) -> None:
     """Raise ``InvalidValue`` if an object is not a scene.
 
     Parameters

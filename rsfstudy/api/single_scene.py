@@ -10,10 +10,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.api.simulation import check_integrator, check_scene, motion_variable_attributes
+from rsfstudy.api.simulation import (
+    build_motion_variable_attributes,
+    check_integrator_is_usable,
+    check_is_scene,
+)
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoResultWarning, RsfStudyWarning
-from rsfstudy.execution import provenance_attributes
+from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
 from rsfstudy.motion import Accuracy, Engine, Integrator
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
@@ -104,7 +108,7 @@ def critical_step(
     >>> round(result["critical_displacement"].item(), 4)
     1.0
     """
-    return _measure_scene_to_dataset(
+    return _compute_measure_as_dataset(
         CriticalStep(of=of, direction=direction),
         scene,
         integrator or Integrator(Accuracy(rtol, budget, engine=engine)),
@@ -180,7 +184,7 @@ def limit_cycle(
     >>> round(cycle["recurrence_interval"].item(), 3)
     9.061
     """
-    return _measure_scene_to_dataset(
+    return _compute_measure_as_dataset(
         LimitCycle(events=events),
         scene,
         integrator or Integrator(Accuracy(rtol, budget, engine=engine)),
@@ -251,10 +255,10 @@ def to_si(
         for name, value in zip(units, given, strict=True)
         if value is not None
     }
-    return DatasetUnits(dataset).convert("Pa", "m", "s", **stated)
+    return DatasetUnits(dataset).convert_to_units("Pa", "m", "s", **stated)
 
 
-def _measure_scene_to_dataset(
+def _compute_measure_as_dataset(
     measure: Measure, scene: Scene, integrator: Integrator, *, is_nested: bool
 ) -> xr.Dataset:
     """Compute a measure of a scene, and return the outputs as a dataset.
@@ -263,8 +267,8 @@ def _measure_scene_to_dataset(
     Pass ``is_nested=True`` if another measure uses the results. The function then emits no
     warnings, and adds its evaluations to the count of the integrator.
     """
-    check_scene(scene)
-    check_integrator(integrator)
+    check_is_scene(scene)
+    check_integrator_is_usable(integrator)
     outcome = (
         measure.run_nested(scene, integrator) if is_nested else measure(scene, integrator.accuracy)
     )
@@ -282,7 +286,11 @@ def _measure_scene_to_dataset(
         values = outcome.values.get(name)
         if values is None:
             values = np.full([len(inner[dim]) for dim in dims], np.nan)
-        variables[name] = dims, values, motion_variable_attributes(find_quantity(name, own), scene)
+        variables[name] = (
+            dims,
+            values,
+            build_motion_variable_attributes(find_quantity(name, own), scene),
+        )
     work = "rhs_evaluations"
     variables[work] = (), outcome.rhs_evaluations, find_quantity(work).attributes
     rate = (), scene.reference_rate, find_quantity("reference_rate").attributes
@@ -300,7 +308,7 @@ def _measure_scene_to_dataset(
         "engine": integrator.engine,
         "status": outcome.status.label,
         "message": outcome.message,
-        **provenance_attributes(f"rsfstudy.{measure.name}"),
+        **build_provenance_attributes(f"rsfstudy.{measure.name}"),
     }
     coordinates: dict[str, Any] = {
         **{

@@ -19,7 +19,7 @@ from rsfstudy.rig import (
 )
 
 #: Columns that are used for event detection.
-_USABLE_COLUMNS = UsableColumns(
+_COLUMNS_FOR_EVENT_DETECTION = UsableColumns(
     ("time", "slip", "displacement", "shear_stress", "friction", "normal_stress"),
     shear_stress_suffices=True,
 )
@@ -41,14 +41,17 @@ class StressRecord(NamedTuple):
         Descriptions of the selection of rows and of filters.
     """
 
-    variables: Mapping[str, Any]
+    variables_by_name: Mapping[str, Any]
     has_time: bool = True
-    is_slip: bool = False
-    processing: tuple[str, ...] = ()
+    displacement_is_slip: bool = False
+    processing_steps: tuple[str, ...] = ()
 
 
 def read_stress_record(
-    record: Any, columns: Mapping[str, Any] | None, normal_stress: Any, options: ReadingOptions
+    record: Any,
+    columns: Mapping[str, Any] | None,
+    normal_stress: Any,
+    reading_options: ReadingOptions,
 ) -> StressRecord:
     """Read time, displacement and shear stress of a record in any format.
 
@@ -73,12 +76,14 @@ def read_stress_record(
     InvalidValue
         If the record has neither shear stress nor friction, or neither time nor displacement.
     """
-    whole = options == ReadingOptions() and columns is None
+    whole = reading_options == ReadingOptions() and columns is None
     if whole and isinstance(record, xr.Dataset) and {"time", "shear_stress"} <= {*record.variables}:
         # Simulated motions have unit scales instead of units.
         names = ("time", "displacement", "shear_stress")
         return StressRecord({name: record.get(name) for name in names})
-    found, table, processing = read_columns(record, columns, _USABLE_COLUMNS, options)
+    found, table, processing = read_columns(
+        record, columns, _COLUMNS_FOR_EVENT_DETECTION, reading_options
+    )
     lacking = "shear stress or friction" if not {"shear_stress", "friction"} & {*found} else ""
     lacking = lacking or ("" if {"time", "displacement"} & {*found} else "time or displacement")
     if lacking:
@@ -89,12 +94,12 @@ def read_stress_record(
         header = ", ".join(table.headings)[:200]
         raise InvalidValue(
             "header", header, f"has no recognised heading for {lacking}", remedy=remedy
-        ).with_location(table.location)
+        ).with_location(table.heading_location)
     moved = found.get("slip", found.get("displacement"))
     series = {"time": found.get("time"), "displacement": moved,
-              "shear_stress": _find_shear_stress(found, normal_stress)}  # fmt: skip
+              "shear_stress": _find_or_compute_shear_stress(found, normal_stress)}  # fmt: skip
     present = {name: column for name, column in series.items() if column is not None}
-    values, smoothing = _smooth(present, options)
+    values, smoothing = _filter_and_thin_columns(present, reading_options)
     variables = {
         name: xr.DataArray(
             values[name], dims="sample", attrs={"units": of.units} if of.units else {}
@@ -110,7 +115,7 @@ def read_stress_record(
     )
 
 
-def _find_shear_stress(columns: Mapping[str, Column], normal_stress: Any) -> Column:
+def _find_or_compute_shear_stress(columns: Mapping[str, Column], normal_stress: Any) -> Column:
     """Return the shear stress, or the product of friction and normal stress in MPa.
 
     If the normal stress is unknown, the function returns friction.
@@ -129,16 +134,16 @@ def _find_shear_stress(columns: Mapping[str, Column], normal_stress: Any) -> Col
     return friction._replace(values=1e-6 * friction.values * pascals, units="MPa")
 
 
-def _smooth(
-    columns: Mapping[str, Column], options: ReadingOptions
+def _filter_and_thin_columns(
+    columns: Mapping[str, Column], reading_options: ReadingOptions
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Filter and thin the columns. The filter needs the time in s."""
     values = {name: column.values for name, column in columns.items()}
     factor = 1.0
-    if options.filter and "time" in columns and columns["time"].units:
+    if reading_options.filter and "time" in columns and columns["time"].units:
         factor = float(compute_conversion_factor("time", columns["time"].units, "s"))
         values["time"] = values["time"] * factor
-    found, processing = options.smooth(values, ("shear_stress",))
+    found, processing = reading_options.filter_and_thin_columns(values, ("shear_stress",))
     if factor != 1.0:
         found["time"] = found["time"] / factor
     return found, processing

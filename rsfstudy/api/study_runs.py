@@ -17,8 +17,8 @@ import xarray as xr
 
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.api import dataset_export
-from rsfstudy.api.progress import compile_scenes_with_notice, show_progress
-from rsfstudy.api.result_paths import find_results, output_directory
+from rsfstudy.api.progress import compile_equations_with_notice, show_progress
+from rsfstudy.api.result_paths import find_results_file, parse_output_path
 from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
@@ -26,25 +26,25 @@ from rsfstudy.execution import (
     OutputOptions,
     ProgressCallback,
     WorkerPool,
+    collect_run_fingerprint,
     prepare_study_run,
-    run_fingerprint,
 )
 from rsfstudy.measures import Outcome
 from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import HtmlMarkup
-from rsfstudy.reporting import format_notes_on_incomplete_results, note_on_norms_near_load_velocity
+from rsfstudy.reporting import describe_slow_instability_norms, format_notes_on_incomplete_results
 from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.storage import (
-    Comparison,
+    ResultsComparison,
     StoredDataset,
     compare_results,
-    compare_same_lattice,
+    compare_results_of_same_study,
     find_cell_number,
     find_fingerprint_differences,
     read_dataset,
 )
-from rsfstudy.study import Study, build_verdict_table, load_study, study_names
+from rsfstudy.study import Study, build_verdict_table, list_study_names, load_study
 
 if TYPE_CHECKING:
     from rsfstudy.plots import Figure
@@ -59,7 +59,7 @@ class StudiesByName(dict[str, Study]):
             (name, study.title, f"{study.size:,}", ", ".join({c.id: c for c in study.claims}))
             for name, study in self.items()
         ]
-        return HtmlMarkup.table(("study", "title", "cells", "claims"), rows)
+        return HtmlMarkup.format_table(("study", "title", "cells", "claims"), rows)
 
 
 @error_boundary
@@ -77,7 +77,7 @@ def studies() -> dict[str, Study]:
     >>> "linear_stability" in rsfstudy.studies()
     True
     """
-    return StudiesByName({name: load_study(name) for name in study_names()})
+    return StudiesByName({name: load_study(name) for name in list_study_names()})
 
 
 #: Time in s after which the progress of fits is shown.
@@ -211,7 +211,7 @@ def run(
     """
     declared = apply_overrides_to_study(study, overrides, rtol=rtol, engine=engine, budget=budget)
     keeping = OutputOptions(
-        output=output_directory(output),
+        output=parse_output_path(output),
         format=format,
         fresh=fresh,
         keep_going=keep_going,
@@ -220,11 +220,11 @@ def run(
     )
     with WorkerPool(workers, client, time_limit) as where:
         results = copy_with_cf_encoding(
-            prepare_run_with_progress(declared, keeping, where, progress)()
+            make_run_function_with_progress(declared, keeping, where, progress)()
         )
     if told := format_notes_on_incomplete_results(results):
         warnings.warn("; ".join(told), IncompleteWarning, stacklevel=find_stacklevel_of_user_code())
-    if slow := note_on_norms_near_load_velocity(results):
+    if slow := describe_slow_instability_norms(results):
         warnings.warn(slow, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return results
 
@@ -260,7 +260,7 @@ def apply_overrides_to_study(
     return declared.with_(**overrides) if overrides else declared
 
 
-def prepare_run_with_progress(
+def make_run_function_with_progress(
     study: Study,
     output_options: OutputOptions,
     worker_pool: WorkerPool,
@@ -299,7 +299,7 @@ def prepare_run_with_progress(
     def run() -> xr.Dataset:
         """Compile the equations if necessary, and run the study."""
         if study.accuracy.engine == Engine.COMPILED:
-            compile_scenes_with_notice(
+            compile_equations_with_notice(
                 ready.plan.example_scenes, study.measure.needs_time, show_progress_bar is True
             )
         with show_progress(study.name, show_progress_bar, **appearance) as show:
@@ -356,10 +356,10 @@ def open(name: str | Path, output: str | Path = Defaults.OUTPUT_DIRECTORY) -> xr
     """
     if not isinstance(name, str | Path):
         raise InvalidValue("name", name, "must be the name of a study, or a path")
-    return read_results(find_results(name, output))
+    return read_study_results(find_results_file(name, output))
 
 
-def read_results(path: Path) -> xr.Dataset:
+def read_study_results(path: Path) -> xr.Dataset:
     """Load a results file into memory.
 
     Parameters
@@ -589,13 +589,13 @@ def rerun(
     >>> bool((table["identical"] == table["values"]).all())
     True
     """
-    theirs = read_dataset(find_results(file, Defaults.OUTPUT_DIRECTORY))
+    theirs = read_dataset(find_results_file(file, Defaults.OUTPUT_DIRECTORY))
     if StoredDataset(theirs).is_of_single_scene:
         if study is not None:
             load_study(str(study))  # The file defines user-defined parts of the scene.
         return dataset_export.rerun_and_compare_motion(theirs)
     declared = StoredDataset(theirs).rebuild_study(study)
-    place = output_directory(output)
+    place = parse_output_path(output)
     if place is not None:
         for taken in place.glob(f"{declared.name}.*"):
             rule = f"contains {taken.name}, which would be overwritten"
@@ -608,12 +608,12 @@ def rerun(
         command_line=f"rsfstudy.rerun {file}",
     )
     with WorkerPool(workers, client, time_limit) as where:
-        ours = prepare_run_with_progress(declared, keeping, where, progress)()
-    return compare_same_lattice(theirs, ours)
+        ours = make_run_function_with_progress(declared, keeping, where, progress)()
+    return compare_results_of_same_study(theirs, ours)
 
 
 @error_boundary
-def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> Comparison:
+def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> ResultsComparison:
     """Compare two datasets of results.
 
     The function compares the declarations, the provenance and the values. Values are compared for
@@ -738,7 +738,7 @@ def recompute_cell(
 
 @partial(error_boundary, is_called_internally=True)
 def _find_cell_in_results_file(
-    source: xr.Dataset | str | Path,
+    results_or_path: xr.Dataset | str | Path,
     cell_coordinates: Mapping[str, Any],
     study_file: str | Path | None,
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
@@ -754,10 +754,10 @@ def _find_cell_in_results_file(
         Stored value and current value of each dependency that has changed, such as the version of
         the code.
     """
-    results = _open_dataset_if_name_or_path(source)
+    results = _open_dataset_if_name_or_path(results_or_path)
     number = find_cell_number(results, cell_coordinates)
     declared = StoredDataset(results).rebuild_study(study_file)
-    now = run_fingerprint(declared, [declared.scene(number)])
+    now = collect_run_fingerprint(declared, [declared.scene(number)])
     return (
         declared,
         number,

@@ -14,7 +14,7 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 if TYPE_CHECKING:
     from rsfstudy.axes.axis import (
         Axis,
-        AxisRow,
+        AxisPointFieldValues,
     )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -29,5 +29,5 @@ else:
 
 __all__ = [
     "Axis",
-    "AxisRow",
+    "AxisPointFieldValues",
 ]

@@ -18,13 +18,13 @@ from rsfstudy._deprecation import accept_former_keyword_names, add_former_member
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_value, is_sequence_of_axis_values
-from rsfstudy.quantities import is_variable_name
+from rsfstudy.quantities import is_valid_variable_name
 from rsfstudy.slider import SceneFields
 
-AxisRow = Mapping[str, Any]
+AxisPointFieldValues = Mapping[str, Any]
 
 
-def fields_of_axis_point(axis_point: Any) -> Any:
+def get_fields_of_axis_point(axis_point: Any) -> Any:
     """Return the field values of an axis point that is given as a mapping or a rig.
 
     Parameters
@@ -95,7 +95,7 @@ def to_plain_value(field_name: str, value: Any) -> Any:
         If the value is an array with one or more dimensions, or an integer that is too large for a
         floating-point number.
     """
-    value = SceneFields.normalise_value(field_name, value)
+    value = SceneFields.replace_part_or_alias_by_part_name(field_name, value)
     if isinstance(value, np.ndarray) and value.ndim:
         raise InvalidValue(field_name, value.tolist(), "must be a single number, bool or string")
     value = value.item() if isinstance(value, np.generic | np.ndarray) else value
@@ -152,12 +152,12 @@ class Axis:
     ['granite', 'gouge']
     """
 
-    fields_of_point = staticmethod(fields_of_axis_point)
+    get_fields_of_point = staticmethod(get_fields_of_axis_point)
     check_storable_text = staticmethod(check_storable_text)
     to_plain_value = staticmethod(to_plain_value)
 
     dimension: str
-    rows: tuple[AxisRow, ...]
+    rows: tuple[AxisPointFieldValues, ...]
     labels: tuple[str, ...] | None
     units: Mapping[str, str]
     sampling_info: Mapping[str, Any]
@@ -170,7 +170,7 @@ class Axis:
         sampling_info: Mapping[str, Any] | None = None,
     ) -> None:
         """Create an axis from values or points."""
-        if not is_variable_name(dimension):
+        if not is_valid_variable_name(dimension):
             rule = "must be a Python identifier in Unicode normalisation form NFC"
             raise InvalidValue("axis name", dimension, rule)
         labels: tuple[str, ...] | None = None
@@ -179,9 +179,9 @@ class Axis:
             and values
             and all(map(is_sequence_of_axis_values, values.values()))
         ):
-            rows = _rows_from_columns(dimension, values)
+            rows = _build_rows_from_columns(dimension, values)
         elif isinstance(values, Mapping):
-            labels, rows = tuple(values), _rows_from_points(dimension, values)
+            labels, rows = tuple(values), _build_rows_from_points(dimension, values)
         else:
             listed = [values] if isinstance(values, str) else values
             if not is_sequence_of_axis_values(listed):
@@ -193,7 +193,7 @@ class Axis:
         held = (dimension, rows, labels, *beside)
         for name, value in zip(self.__dataclass_fields__, held, strict=True):
             object.__setattr__(self, name, value)
-        self._check_values()
+        self._check_field_values()
 
     @classmethod
     def samples(
@@ -266,7 +266,9 @@ class Axis:
         from rsfstudy.axes import axis_samples
 
         drawn, how = axis_samples.draw_samples(distribution, n, seed, method, covariance)
-        return cls(dimension, axis_samples.compute_field_values(drawn, fields), units, how)
+        return cls(
+            dimension, axis_samples.compute_field_values_from_samples(drawn, fields), units, how
+        )
 
     @classmethod
     def cases(
@@ -317,7 +319,7 @@ class Axis:
         from rsfstudy.axes import axis_samples
 
         columns, stated = axis_samples.read_table_columns_and_units(table)
-        made = axis_samples.compute_field_values(columns, fields)
+        made = axis_samples.compute_field_values_from_samples(columns, fields)
         columns_by_field = {name: name for name in columns} if fields is None else fields
         kept = {
             name: stated[column]
@@ -328,7 +330,7 @@ class Axis:
         axis_samples.check_draws_have_units(table, columns_by_field, known)
         return cls(dimension, made, known)
 
-    def _check_values(self) -> None:
+    def _check_field_values(self) -> None:
         if not self.rows:
             raise InvalidValue("axis", self.dimension, "has no values")
         if not isinstance(self.units, Mapping) or not set(self.units) <= set(self.fields):
@@ -368,13 +370,13 @@ class Axis:
         return self.labels is None and self.dimension not in self.rows[0]
 
     @property
-    def is_single_field(self) -> bool:
+    def varies_single_field(self) -> bool:
         """True if the axis varies a single field, whose name is the dimension name."""
         return self.labels is None and not self.has_numbered_points
 
     def with_rows(
         self,
-        rows: Sequence[AxisRow],
+        rows: Sequence[AxisPointFieldValues],
         units: Mapping[str, str],
         sampling_info: Mapping[str, Any] | None = None,
     ) -> Axis:
@@ -394,21 +396,23 @@ class Axis:
         Axis
             Axis with the same dimension and the same labels.
         """
-        return Axis(self.dimension, self._values_for_constructor(rows), units, sampling_info)
+        return Axis(
+            self.dimension, self._convert_rows_to_constructor_values(rows), units, sampling_info
+        )
 
-    def _values_for_constructor(self, rows: Sequence[AxisRow]) -> Any:
+    def _convert_rows_to_constructor_values(self, rows: Sequence[AxisPointFieldValues]) -> Any:
         """Convert the rows to the format that ``Axis`` accepts as ``values``."""
         if self.labels is not None:
             return {label: dict(row) for label, row in zip(self.labels, rows, strict=True)}
         if self.has_numbered_points:
-            return rows_to_field_columns(rows)
+            return convert_rows_to_field_columns(rows)
         return [row.get(self.dimension) for row in rows]
 
     def __len__(self) -> int:
         """Return the number of points."""
         return len(self.rows)
 
-    def classify_rows(self) -> np.ndarray:
+    def group_rows_by_scene_parts(self) -> np.ndarray:
         """Assign each row of the axis to a group of similar rows.
 
         All rows of a group set the same fields. Within a group, the strings and flags of a field
@@ -422,10 +426,7 @@ class Axis:
         """
         known: dict[tuple[Any, ...], int] = {}
         return np.array(
-            [
-                known.setdefault(_build_classification_key_of_row(row), len(known))
-                for row in self.rows
-            ]
+            [known.setdefault(_build_grouping_key_of_row(row), len(known)) for row in self.rows]
         )
 
     def describe(self) -> dict[str, Any]:
@@ -440,7 +441,7 @@ class Axis:
         stated = {name: about for name, about in beside.items() if about}
         return {
             "dimension": self.dimension,
-            "values": self._values_for_constructor(self.rows),
+            "values": self._convert_rows_to_constructor_values(self.rows),
             **stated,
         }
 
@@ -454,16 +455,18 @@ class Axis:
         return list(self.labels or values)
 
 
-def _build_classification_key_of_row(axis_row: AxisRow) -> tuple[Any, ...]:
+def _build_grouping_key_of_row(axis_row: AxisPointFieldValues) -> tuple[Any, ...]:
     return tuple(
         (name, type(value), bool(value) if isinstance(value, float) else value)
         for name, value in axis_row.items()
     )
 
 
-def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tuple[AxisRow, ...]:
+def _build_rows_from_points(
+    dimension: str, labelled_points: Mapping[str, Any]
+) -> tuple[AxisPointFieldValues, ...]:
     """Create the rows of a zipped axis from a mapping of labels to fields."""
-    rows = {label: fields_of_axis_point(point) for label, point in labelled_points.items()}
+    rows = {label: get_fields_of_axis_point(point) for label, point in labelled_points.items()}
     for label, row in rows.items():
         check_storable_text(dimension, label)
         if not label:
@@ -475,13 +478,13 @@ def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tup
     return tuple({n: to_plain_value(n, v) for n, v in row.items()} for row in rows.values())
 
 
-def _rows_from_columns(
+def _build_rows_from_columns(
     dimension: str, values_by_field: Mapping[str, Sequence[Any]]
-) -> tuple[AxisRow, ...]:
+) -> tuple[AxisPointFieldValues, ...]:
     """Create the rows of an axis with numbered points from lists of values."""
     lengths = {name: len(column) for name, column in values_by_field.items()}
     for name, length in lengths.items():
-        if not is_variable_name(name):
+        if not is_valid_variable_name(name):
             raise InvalidValue("column", name, "does not have the name of a field")
         if name == dimension:
             rule = "has the name of the axis"
@@ -496,7 +499,7 @@ def _rows_from_columns(
     return tuple(dict(zip(values_by_field, row, strict=True)) for row in zip(*made, strict=True))
 
 
-def rows_to_field_columns(rows: Sequence[AxisRow]) -> dict[str, list[Any]]:
+def convert_rows_to_field_columns(rows: Sequence[AxisPointFieldValues]) -> dict[str, list[Any]]:
     """Convert rows with identical fields to one list of values per field.
 
     Parameters

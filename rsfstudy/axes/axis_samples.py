@@ -23,13 +23,13 @@ QuantityNameOrFunction = str | Callable[[Mapping[str, np.ndarray]], Any]
 SAMPLING_METHODS = ("sobol", "latin_hypercube", "random", "saltelli")
 #: Sampling methods that use Sobol points. Sobol points are balanced only if their number is a power
 #: of two.
-_SOBOL_METHODS = ("sobol", "saltelli")
+_SOBOL_SAMPLING_METHODS = ("sobol", "saltelli")
 #: Smallest probability at which quantiles are computed. The quantiles of unbounded distributions
 #: are infinite at the probabilities 0 and 1.
-_MIN_SAMPLED_PROBABILITY = 2.0**-40
+_MIN_QUANTILE_PROBABILITY = 2.0**-40
 #: Tolerance for negative eigenvalues of a correlation matrix. Small negative eigenvalues result
 #: from rounding errors.
-_EIGENVALUE_ROUNDING_ERROR = 1e-10
+_NEGATIVE_EIGENVALUE_TOLERANCE = 1e-10
 #: Dimension of the draws of fitted parameters, and units of the fitted parameters that are also
 #: fields with units.
 _DRAW_DIMENSION, _UNITS_BY_FITTED_PARAMETER = "draw", {"slip_distance": "um", "stiffness": "1/um"}
@@ -72,10 +72,12 @@ def draw_samples(
             "must be a mapping from names to distributions, with at least one name",
         )
     _check_sampling_arguments(distributions, sample_count, seed, method)
-    deviations, correlation = _compute_sds_and_correlation_matrix(distributions, covariance, method)
+    deviations, correlation = _compute_stds_and_correlation_matrix(
+        distributions, covariance, method
+    )
     scores = ndtri(
         _draw_uniform_samples(len(distributions), sample_count, seed, method)
-    ) @ _matrix_square_root(correlation)
+    ) @ _compute_matrix_square_root(correlation)
     found = {}
     for (name, drawn), score, deviation in zip(
         distributions.items(), scores.T, deviations, strict=True
@@ -105,20 +107,20 @@ def _check_sampling_arguments(
             raise InvalidValue(name, value, f"must be a whole number, {least} or more")
     if sample_count > MAX_ITEMS_OF_LIST_ARGUMENT:
         raise InvalidValue("n", sample_count, f"must be at most {MAX_ITEMS_OF_LIST_ARGUMENT:,}")
-    if method in _SOBOL_METHODS and sample_count & (sample_count - 1):
+    if method in _SOBOL_SAMPLING_METHODS and sample_count & (sample_count - 1):
         below = 1 << (int(sample_count).bit_length() - 1)
         rule = "must be a power of two, because Sobol sequences are balanced only for powers of two"
         remedy = f"Use n={below} or n={2 * below}, or method='latin_hypercube'."
         raise InvalidValue("n", sample_count, rule, remedy=remedy)
     for name, drawn in distributions.items():
-        if not _is_value_with_error(drawn) and _quantile_function(drawn) is None:
+        if not _is_value_with_error(drawn) and _get_quantile_function(drawn) is None:
             rule = "must be a frozen distribution of scipy.stats, or a mean value"
             raise InvalidValue(
                 name, drawn, rule, remedy="Pass, for example, scipy.stats.norm(0.01, 0.001)."
             )
 
 
-def _compute_sds_and_correlation_matrix(
+def _compute_stds_and_correlation_matrix(
     distributions: Mapping[str, Any], covariance: Any, method: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the standard deviations and the correlation matrix."""
@@ -154,7 +156,7 @@ def _compute_sds_and_correlation_matrix(
         )
         raise InvalidValue("covariance", given.tolist(), rule, remedy=remedy)
     lowest = float(np.linalg.eigvalsh(correlation)[0])
-    if lowest < -_EIGENVALUE_ROUNDING_ERROR * count:
+    if lowest < -_NEGATIVE_EIGENVALUE_TOLERANCE * count:
         rule = (
             "must be positive semidefinite, but its correlation matrix has the eigenvalue "
             f"{lowest:.2g}"
@@ -163,7 +165,7 @@ def _compute_sds_and_correlation_matrix(
     return deviations, correlation
 
 
-def _matrix_square_root(correlation: np.ndarray) -> np.ndarray:
+def _compute_matrix_square_root(correlation: np.ndarray) -> np.ndarray:
     """Compute the symmetric square root of a matrix.
 
     Unlike other matrix factorisations, the symmetric square root is unique, so all machines return
@@ -193,7 +195,9 @@ def _draw_uniform_samples(
         mixed = np.where(np.eye(quantity_count, dtype=bool), theirs[:, None, :], ours[:, None, :])
         found = np.concatenate([ours[:, None], theirs[:, None], mixed], axis=1)
     return np.clip(
-        found.reshape(-1, quantity_count), _MIN_SAMPLED_PROBABILITY, 1.0 - _MIN_SAMPLED_PROBABILITY
+        found.reshape(-1, quantity_count),
+        _MIN_QUANTILE_PROBABILITY,
+        1.0 - _MIN_QUANTILE_PROBABILITY,
     )
 
 
@@ -201,7 +205,7 @@ def _is_value_with_error(distribution: Any) -> bool:
     return isinstance(distribution, int | float | np.number) and not isinstance(distribution, bool)
 
 
-def _quantile_function(distribution: Any) -> Any:
+def _get_quantile_function(distribution: Any) -> Any:
     """Return the quantile function of a distribution."""
     return (
         getattr(distribution, "ppf", None)
@@ -215,7 +219,7 @@ def _compute_quantiles(
 ) -> np.ndarray:
     """Compute the quantiles of a distribution, and check that they are finite."""
     try:
-        found = np.asarray(_quantile_function(distribution)(probabilities), dtype=float)
+        found = np.asarray(_get_quantile_function(distribution)(probabilities), dtype=float)
     except ValueError:  # The parameters of the distribution are arrays.
         found = np.empty(0)
     if found.shape != probabilities.shape or not np.isfinite(found).all():
@@ -240,8 +244,9 @@ def _describe_distribution(distribution: Any) -> Any:
     return f"{distribution.dist.name}({', '.join(given)})"
 
 
-def compute_field_values(
-    sampled_values: Mapping[str, Any], field_sources: Mapping[str, QuantityNameOrFunction] | None
+def compute_field_values_from_samples(
+    sampled_values: Mapping[str, Any],
+    quantity_or_function_by_field: Mapping[str, QuantityNameOrFunction] | None,
 ) -> dict[str, Sequence[Any] | np.ndarray]:
     """Compute the values of all fields from sampled quantities.
 
@@ -262,10 +267,10 @@ def compute_field_values(
     InvalidValue
         If a source is unknown, or if a function does not return numbers.
     """
-    if field_sources is None:
+    if quantity_or_function_by_field is None:
         return dict(sampled_values)
     found = {}
-    for name, by in field_sources.items():
+    for name, by in quantity_or_function_by_field.items():
         if isinstance(by, str):
             if by not in sampled_values:
                 raise InvalidValue(name, by, "is not a sampled quantity", choices=sampled_values)

@@ -7,7 +7,7 @@ import pandas as pd
 from rsfstudy.reporting import TextTable, format_number_or_dash
 
 
-def build_agreement_table(agreement: pd.DataFrame) -> TextTable:
+def build_dataset_agreement_table(agreement_by_variable: pd.DataFrame) -> TextTable:
     """Build a table of the agreement of each variable.
 
     Parameters
@@ -30,6 +30,6 @@ def build_agreement_table(agreement: pd.DataFrame) -> TextTable:
             "beyond error estimates": format_number_or_dash(row["beyond_errors"], ".0f"),
             "largest difference": format_number_or_dash(row["largest_difference"], ".3g"),
         }
-        for row in agreement.to_dict("records")
+        for row in agreement_by_variable.to_dict("records")
     ]
     return TextTable(rows)

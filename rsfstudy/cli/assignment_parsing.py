@@ -16,10 +16,10 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.rig import expand_range, has_time_column, parse_number
 from rsfstudy.slider import UserLoading
 
-_FLAG_VALUE_BY_WORD = {"true": True, "yes": True, "false": False, "no": False}
+_BOOLEAN_BY_WORD = {"true": True, "yes": True, "false": False, "no": False}
 
 
-def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
+def parse_overrides(study: Study, assignments: tuple[str, ...]) -> dict[str, Any]:
     """Parse the values of ``--set`` for a study.
 
     Parameters
@@ -41,19 +41,21 @@ def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
         If an assignment is malformed or a name is set twice.
     """
     texts = {p for axis in study.axes for p in axis.point_names if axis.labels or "," in p}
-    found = _parse_each_assignment(settings, lambda text: parse_axis_assignment(text, texts))
+    found = _parse_assignments_without_duplicates(
+        assignments, lambda text: parse_axis_assignment(text, texts)
+    )
     if "loading" in found:
         given, rig = found["loading"], study.rig
         several = isinstance(given, list)
         found["loading"] = (
-            [parse_loading_file(v, rig) for v in given]
+            [read_loading_if_csv_path(v, rig) for v in given]
             if several
-            else parse_loading_file(given, rig)
+            else read_loading_if_csv_path(given, rig)
         )
     return found
 
 
-def parse_scene_field_assignments(settings: tuple[str, ...]) -> dict[str, Any]:
+def parse_scene_field_assignments(assignments: tuple[str, ...]) -> dict[str, Any]:
     """Parse the values of ``--set`` for a single scene.
 
     Parameters
@@ -72,16 +74,18 @@ def parse_scene_field_assignments(settings: tuple[str, ...]) -> dict[str, Any]:
         If an assignment is malformed or a field is set twice.
     """
     rule = "must have the form FIELD=VALUE, for example law=slowness"
-    given = _parse_each_assignment(settings, lambda text: split_assignment("--set", text, rule))
+    given = _parse_assignments_without_duplicates(
+        assignments, lambda text: split_assignment("--set", text, rule)
+    )
     return {name: parse_boolean_number_or_text(text) for name, text in given.items()}
 
 
-def _parse_each_assignment(
-    settings: tuple[str, ...], parse_assignment: Callable[[str], tuple[str, Any]]
+def _parse_assignments_without_duplicates(
+    assignments: tuple[str, ...], parse_assignment: Callable[[str], tuple[str, Any]]
 ) -> dict[str, Any]:
     """Parse assignments, and raise an error if a name is set twice."""
     found: dict[str, Any] = {}
-    for text in settings:
+    for text in assignments:
         name, given = parse_assignment(text)
         if name in found:
             raise InvalidValue("--set", text, f"sets {name} twice")
@@ -89,7 +93,7 @@ def _parse_each_assignment(
     return found
 
 
-def parse_loading_file(file_path: Any, rig: Rig | None) -> Any:
+def read_loading_if_csv_path(loading_or_path: Any, rig: Rig | None) -> Any:
     """Read a loading if a value is the path of a CSV file.
 
     Parameters
@@ -105,8 +109,8 @@ def parse_loading_file(file_path: Any, rig: Rig | None) -> Any:
         Loading, if the value is the path of a CSV file. The loading has the name of the file. Any
         other value is returned unchanged.
     """
-    path = Path(str(file_path))
-    return read_loading_file(path, rig) if path.suffix.lower() == ".csv" else file_path
+    path = Path(str(loading_or_path))
+    return read_loading_file(path, rig) if path.suffix.lower() == ".csv" else loading_or_path
 
 
 def read_loading_file(path: Path, rig: Rig | None) -> UserLoading:
@@ -129,7 +133,7 @@ def read_loading_file(path: Path, rig: Rig | None) -> UserLoading:
     return read(path, rig, name=path.stem)
 
 
-def parse_rig(option_texts: Mapping[str, str]) -> Rig:
+def build_rig_from_options(text_by_option_name: Mapping[str, str]) -> Rig:
     """Create a rig from command line options.
 
     Parameters
@@ -149,7 +153,7 @@ def parse_rig(option_texts: Mapping[str, str]) -> Rig:
     """
     stated = {
         name: parse_number_or_text(text)
-        for name, text in option_texts.items()
+        for name, text in text_by_option_name.items()
         if name in Rig.QUANTITIES
     }
     for field in fields(Rig):
@@ -184,7 +188,7 @@ def parse_cell_coordinate(text: str) -> tuple[str, str]:
     return name, value
 
 
-def split_assignment(option_name: str, text: str, format_rule: str) -> tuple[str, str]:
+def split_assignment(option_name: str, text: str, expected_form: str) -> tuple[str, str]:
     """Split an assignment at the first equals sign.
 
     Parameters
@@ -208,7 +212,7 @@ def split_assignment(option_name: str, text: str, format_rule: str) -> tuple[str
     """
     name, equals, given = (part.strip() for part in text.partition("="))
     if not (name and equals and given):
-        raise InvalidValue(option_name, text, format_rule)
+        raise InvalidValue(option_name, text, expected_form)
     return name, given
 
 
@@ -236,7 +240,7 @@ def parse_column_assignments(text: str | None) -> dict[str, str] | None:
     return dict(split_assignment("--columns", part.strip(), rule) for part in parts) or None
 
 
-def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str, Any]:
+def parse_axis_assignment(text: str, axis_labels: Collection[str]) -> tuple[str, Any]:
     """Parse an assignment of values to an axis.
 
     Parameters
@@ -261,9 +265,9 @@ def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str
     name, values = split_assignment(
         "--set", text, "must have the form AXIS=VALUES, for example b_over_a=2,3,4"
     )
-    if values in known_labels:
+    if values in axis_labels:
         return name, [values]
-    for label in sorted(known_labels, key=len, reverse=True):
+    for label in sorted(axis_labels, key=len, reverse=True):
         values = values.replace(label, label.replace(",", "\0"))
     parts = [part.strip().replace("\0", ",") for part in values.split(",")]
     if not all(parts):
@@ -289,8 +293,8 @@ def parse_boolean_number_or_text(text: str) -> Any:
         Converted value. Any other string is returned unchanged.
     """
     return (
-        _FLAG_VALUE_BY_WORD[text.lower()]
-        if text.lower() in _FLAG_VALUE_BY_WORD
+        _BOOLEAN_BY_WORD[text.lower()]
+        if text.lower() in _BOOLEAN_BY_WORD
         else parse_number_or_text(text)
     )
 

@@ -18,7 +18,7 @@ from rsfstudy.cli.options import CommandOptions
 from rsfstudy.errors import Interrupted
 
 
-class LazyCommands(MutableMapping[str, click.Command]):
+class LazyCommandMapping(MutableMapping[str, click.Command]):
     """Mapping from command names to commands.
 
     The module of a command is imported when the command is looked up.
@@ -61,7 +61,7 @@ class CommandGroup(click.Group):
 
     def __init__(self, **settings: Any) -> None:
         """Create the group with all commands of rsfstudy."""
-        super().__init__(**settings | {"commands": LazyCommands()})
+        super().__init__(**settings | {"commands": LazyCommandMapping()})
 
     def list_commands(self, _context: click.Context) -> list[str]:
         """Return the names of the commands.
@@ -104,7 +104,7 @@ class CommandGroup(click.Group):
             raise Interrupted(str(error) or "interrupted") from error
 
 
-class Command(click.Command):
+class OptionsObjectCommand(click.Command):
     """Command that passes its arguments and options to a function as one object."""
 
     def invoke(self, context: click.Context) -> int:

@@ -51,7 +51,7 @@ def main() -> None:
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
     warnings.filterwarnings("ignore", category=IncompleteWarning)  # commands print it themselves
     warnings.showwarning = lambda message, *_place: _print_warning(message)
-    logging.getLogger("matplotlib").addHandler(_LOG_HANDLER)
+    logging.getLogger("matplotlib").addHandler(_MATPLOTLIB_LOG_HANDLER)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # the encoding may lack characters
             stream.reconfigure(errors="backslashreplace")
@@ -132,7 +132,7 @@ class _WarnOnceHandler(logging.Handler):
             _print_warning(text)
 
 
-_LOG_HANDLER = _WarnOnceHandler(logging.WARNING)
+_MATPLOTLIB_LOG_HANDLER = _WarnOnceHandler(logging.WARNING)
 
 
 def _print_warning(message: Warning | str) -> None:

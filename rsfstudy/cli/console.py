@@ -19,7 +19,7 @@ _MIN_WIDTH, _MAX_WIDTH = 16, 1000
 _WIDTH_OF_REDIRECTED_OUTPUT = 100
 
 
-class PlainConsole(Console):
+class LiteralTextConsole(Console):
     """Console that prints text literally, including square brackets.
 
     Control characters could change the state of the terminal. The console therefore prints control
@@ -99,5 +99,5 @@ def make_text_printable(text: str) -> str:
     return escape_control_characters(shorten_text(text, _MAX_PRINTED_CHARACTERS))
 
 
-stdout_console = PlainConsole(markup=False, emoji=False, highlight=False)
-stderr_console = PlainConsole(stderr=True, markup=False, emoji=False, highlight=False)
+stdout_console = LiteralTextConsole(markup=False, emoji=False, highlight=False)
+stderr_console = LiteralTextConsole(stderr=True, markup=False, emoji=False, highlight=False)

@@ -17,7 +17,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import CellPlan
 from rsfstudy.formatting import format_duration
 from rsfstudy.motion import Engine
-from rsfstudy.storage import CellTimings
+from rsfstudy.storage import CellWallTimes
 
 #: Typical speed-up of the compiled engine relative to the SciPy engine, by name of the measure. We
 #: measured speed-ups by factors of 7 to 12 for critical steps, and of 31 to 72 for limit cycles.
@@ -32,7 +32,7 @@ _MIN_SECONDS_FOR_FASTER_ENGINE_HINT = 60.0
 
 
 @dataclass(frozen=True)
-class CostEstimate:
+class StudyCostEstimate:
     """Estimated work and computing time of a study on one core.
 
     Parameters
@@ -55,12 +55,12 @@ class CostEstimate:
     rhs_evaluations: int
     seconds: float
     cell_count: int
-    measured_cells: int
-    timed_cells: int
-    journal: Path
+    measured_cell_count: int
+    timed_cell_count_in_journal: int
+    journal_path: Path
 
 
-def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEstimate:
+def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> StudyCostEstimate:
     """Estimate the work and the computing time of a study on one core.
 
     Parameters
@@ -79,21 +79,23 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEsti
     work, guess = cell_plan.estimate_evaluations_and_time()
     work = round(work, 2 - len(str(work)))  # More digits would not be significant.
     journal = output_directory / f"{cell_plan.study.name}.cells.sqlite"
-    took, cells = CellTimings.read(journal), len(cell_plan.unique_cell_numbers)
+    took, cells = CellWallTimes.read_from_journal(journal), len(cell_plan.unique_cell_numbers)
     if (
         took is None
         or not _timings_match_accuracy_and_engine(cell_plan, took)
         or not took.seconds_by_cell_key
     ):
-        return CostEstimate(work, guess, cells, 0, 0, journal)
+        return StudyCostEstimate(work, guess, cells, 0, 0, journal)
     times = took.seconds_by_cell_key
     keys = cell_plan.keys[cell_plan.unique_cell_numbers].tolist()
     known = [times[key] for key in keys if key in times]
     missing = (cells - len(known)) * float(np.mean(list(times.values())))
-    return CostEstimate(work, math.fsum(known) + missing, cells, len(known), len(times), journal)
+    return StudyCostEstimate(
+        work, math.fsum(known) + missing, cells, len(known), len(times), journal
+    )
 
 
-def collect_cost_fields(cell_plan: CellPlan, output_directory: Path) -> dict[str, Any]:
+def collect_accuracy_and_cost_fields(cell_plan: CellPlan, output_directory: Path) -> dict[str, Any]:
     """Return the accuracy of a study and its expected cost as plain data.
 
     Parameters
@@ -134,14 +136,14 @@ def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
     cost = estimate_study_cost(cell_plan, output_directory)
     rtol, time = cell_plan.study.accuracy.rtol, f"{format_duration(cost.seconds)} on one core"
     text = f"about {cost.rhs_evaluations:,} right-hand-side evaluations at rtol {rtol:g}; "
-    if not cost.timed_cells:
+    if not cost.timed_cell_count_in_journal:
         return f"{text}roughly {time} (may be up to ten times longer)"
-    if cost.measured_cells == cost.cell_count:
-        return f"{text}last run took {time} ({cost.journal})"
-    return f"{text}about {time}, based on {cost.timed_cells:,} cells in {cost.journal}"
+    if cost.measured_cell_count == cost.cell_count:
+        return f"{text}last run took {time} ({cost.journal_path})"
+    return f"{text}about {time}, based on {cost.timed_cell_count_in_journal:,} cells in {cost.journal_path}"
 
 
-def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
+def suggest_compiled_engine(cell_plan: CellPlan, output_directory: Path) -> str:
     """Return a hint for the user that the compiled engine is faster.
 
     Parameters
@@ -177,12 +179,12 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
     return f"--engine compiled is usually faster: about {each}"
 
 
-def _timings_match_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
+def _timings_match_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellWallTimes) -> bool:
     """Return True if timings were measured with the accuracy and engine of a plan."""
     asked = cell_plan.study.accuracy
-    return cell_timings.fingerprint.get("rtol") == asked.rtol and cell_timings.fingerprint.get(
-        "engine"
-    ) == (asked.engine)
+    return cell_timings.run_fingerprint.get(
+        "rtol"
+    ) == asked.rtol and cell_timings.run_fingerprint.get("engine") == (asked.engine)
 
 
 def describe_missing_engine_packages(engine_name: str) -> str:

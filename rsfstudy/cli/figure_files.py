@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from rsfstudy.cli.options import CommandOptions
-from rsfstudy.cli.printing import print_note
+from rsfstudy.cli.printing import print_on_stderr
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.plots import (
@@ -49,7 +49,7 @@ def write_figure(figure: Figure, path: Path, style: str | None = None) -> None:
         raise DataError(f"{path}: cannot be written ({error})") from error
 
 
-def default_figure_path(results_path: Path, options: CommandOptions) -> Path:
+def build_default_figure_path(results_path: Path, command_options: CommandOptions) -> Path:
     """Return the default path of the figure of a results file.
 
     Parameters
@@ -66,7 +66,7 @@ def default_figure_path(results_path: Path, options: CommandOptions) -> Path:
         the path.
     """
     name = results_path.name.removesuffix(".nc").removesuffix(".zarr")
-    words = [name, options.variable, options.form or Defaults.FIGURE_FORMATS[0]]
+    words = [name, command_options.variable, command_options.form or Defaults.FIGURE_FORMATS[0]]
     return results_path.with_name(".".join(filter(None, words)))
 
 
@@ -95,12 +95,12 @@ def load_user_figure_or_default(dataset: xr.Dataset, study_file: Path | None) ->
         if study_file is not None:
             raise
         reason = "because the figure of the study is not available"
-        print_note(f"note: drawn as maps or lines, {reason}. {error}")
+        print_on_stderr(f"note: drawn as maps or lines, {reason}. {error}")
         return "lines"
 
 
 def draw_and_save_figure(
-    dataset: xr.Dataset, figure_path: Path, options: CommandOptions, user_figure: Any
+    dataset: xr.Dataset, figure_path: Path, command_options: CommandOptions, user_figure: Any
 ) -> list[Path]:
     """Draw the figure of a results dataset, and save the figure.
 
@@ -122,10 +122,12 @@ def draw_and_save_figure(
         an empty list, because the results have already been written.
     """
     try:
-        appearance = options.collect_option_values("style", "width", "header")
-        save_figure(dataset, figure_path, user_figure, variable=options.variable, **appearance)
+        appearance = command_options.collect_option_values("style", "width", "header")
+        save_figure(
+            dataset, figure_path, user_figure, variable=command_options.variable, **appearance
+        )
     except (OSError, RsfStudyError) as error:
-        print_note(f"no figure: {error}")
+        print_on_stderr(f"no figure: {error}")
         return []
     return [figure_path]
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult
-from rsfstudy.cli.study_results import StudyResults, print_failures
+from rsfstudy.cli.study_results import StudyResults, print_failed_cells
 from rsfstudy.reporting import (
-    all_fits_are_valid,
-    build_contents_table,
+    are_all_fits_valid,
+    build_result_variables_table,
     build_summary_tables_and_sentences,
-    classify_contents,
+    classify_file_contents,
     describe_dataset_origin,
     summarise_file_as_fields,
 )
@@ -35,23 +35,23 @@ class FileSummary(CommandResult):
     """
 
     dataset: xr.Dataset
-    file: str
+    file_path: str
 
     @property
     def exit_status(self) -> int:
         """Exit status of the command. The status is 1 if a result failed or is missing."""
-        kind = classify_contents(self.dataset)
+        kind = classify_file_contents(self.dataset)
         if kind == "results":
-            succeeded = StudyResults(self.dataset, self.file).is_complete
+            succeeded = StudyResults(self.dataset, self.file_path).is_complete_without_failures
         elif kind == "fit":
-            succeeded = all_fits_are_valid(self.dataset)
+            succeeded = are_all_fits_valid(self.dataset)
         else:
             succeeded = self.dataset.attrs["status"] == Status.OK.label
         return EXIT_STATUS_OK if succeeded else EXIT_STATUS_FAILED
 
-    def json_fields(self) -> Mapping[str, Any]:
+    def to_json_fields(self) -> Mapping[str, Any]:
         """Return the fields of the JSON output."""
-        return summarise_file_as_fields(self.dataset, self.file)
+        return summarise_file_as_fields(self.dataset, self.file_path)
 
 
 def print_file_summary(summary: FileSummary) -> None:
@@ -66,8 +66,8 @@ def print_file_summary(summary: FileSummary) -> None:
     title = dataset.attrs.get("title", "result for a single scene")
     name = f"{dataset.attrs['id']}: " if "id" in dataset.attrs else ""
     print_line(f"{name}{title}\n", style="bold")
-    print_pieces([describe_dataset_origin(dataset)])
-    print_pieces(build_summary_tables_and_sentences(dataset))
-    if classify_contents(dataset) == "results":
-        print_pieces([build_contents_table(dataset)])
-        print_failures(StudyResults(dataset, summary.file))
+    print_tables_and_sentences([describe_dataset_origin(dataset)])
+    print_tables_and_sentences(build_summary_tables_and_sentences(dataset))
+    if classify_file_contents(dataset) == "results":
+        print_tables_and_sentences([build_result_variables_table(dataset)])
+        print_failed_cells(StudyResults(dataset, summary.file_path))

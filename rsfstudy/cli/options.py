@@ -22,7 +22,7 @@ from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import Engine
-from rsfstudy.path_checks import check_path
+from rsfstudy.path_checks import check_path_is_valid
 
 DecoratedFunction = TypeVar("DecoratedFunction", bound=Callable[..., Any])
 
@@ -55,7 +55,7 @@ class CommandOptions(SimpleNamespace):
         return {name: getattr(self, name) for name in option_names}
 
     @property
-    def changes_accuracy(self) -> bool:
+    def is_rtol_specified(self) -> bool:
         """True if the user specified a relative tolerance."""
         return self.rtol is not None
 
@@ -69,7 +69,7 @@ class CommandOptions(SimpleNamespace):
         }
 
 
-class FilePath(click.Path):
+class PathParameterType(click.Path):
     """Click parameter type for paths.
 
     Parameters
@@ -107,7 +107,7 @@ class FilePath(click.Path):
             If the path is not valid.
         """
         name = param.opts[0] if isinstance(param, click.Option) else str(param and param.name)
-        check_path(name, value)
+        check_path_is_valid(name, value)
         return super().convert(value, param, ctx)
 
 
@@ -174,7 +174,9 @@ def make_output_option(
     callable
         Decorator for a command.
     """
-    return click.option("--output", type=FilePath(**path_settings), default=default, help=help_text)
+    return click.option(
+        "--output", type=PathParameterType(**path_settings), default=default, help=help_text
+    )
 
 
 json_option = click.option(
@@ -186,8 +188,10 @@ study_name_or_all_argument = combine_option_decorators(
         "--all", "every", is_flag=True, help="Process all studies that `rsfstudy list` shows."
     ),
 )
-output_option = make_output_option("Results directory.", Defaults.OUTPUT_DIRECTORY, file_okay=False)
-set_values_option = click.option(
+output_directory_option = make_output_option(
+    "Results directory.", Defaults.OUTPUT_DIRECTORY, file_okay=False
+)
+set_axis_values_option = click.option(
     "--set",
     "settings",
     multiple=True,
@@ -211,7 +215,7 @@ engine_option = click.option(
     "[default: engine set by the study, otherwise scipy]",
 )
 
-budget_option = make_count_option(
+evaluation_budget_option = make_count_option(
     "--budget",
     None,
     "Maximum number of right-hand-side evaluations per cell. If you increase the maximum, "
@@ -220,7 +224,7 @@ budget_option = make_count_option(
 )
 quiet_option = click.option("--quiet", is_flag=True, help="Do not show progress.")
 #: Options of the worker pool that computes the cells.
-worker_options = combine_option_decorators(
+worker_pool_options = combine_option_decorators(
     make_count_option("--workers", 2, "Number of worker processes on this computer."),
     click.option(
         "--serial",
@@ -243,18 +247,18 @@ worker_options = combine_option_decorators(
 )
 study_file_option = click.option(
     "--study",
-    type=FilePath(),
+    type=PathParameterType(),
     help="Python file that declares the study. The file is required if the study defines its "
     "own measures, scene parts or figures.",
 )
 
 #: Names of variables by their names on the command line. The mapping contains only abscissae that
 #: have a different name on the command line.
-_ABSCISSA_VARIABLES = {"displacement": "load_point_displacement"}
+_VARIABLE_BY_ABSCISSA_CHOICE = {"displacement": "load_point_displacement"}
 abscissa_option = click.option(
     "--against",
     type=click.Choice(["displacement", "slip", "time"]),
-    callback=lambda _context, _option, value: _ABSCISSA_VARIABLES.get(value, value),
+    callback=lambda _context, _option, value: _VARIABLE_BY_ABSCISSA_CHOICE.get(value, value),
     help="Horizontal axis of motion figures: load point displacement, slip or time.  [default: "
     "slip if the load point is held fixed, otherwise displacement]",
 )
@@ -297,7 +301,7 @@ def _check_width_option(
 
 
 #: Options for the style and the width of figures.
-style_options = combine_option_decorators(
+figure_style_options = combine_option_decorators(
     click.option(
         "--style",
         metavar="STYLE",
@@ -313,7 +317,7 @@ style_options = combine_option_decorators(
         "174 mm for several columns]",
     ),
 )
-header_option = click.option(
+figure_header_option = click.option(
     "--no-header",
     "header",
     is_flag=True,
@@ -330,8 +334,8 @@ figure_options = combine_option_decorators(
         type=click.Choice(Defaults.FIGURE_FORMATS),
         help="Figure format.  [default: png]",
     ),
-    style_options,
-    header_option,
+    figure_style_options,
+    figure_header_option,
 )
 
 
@@ -373,7 +377,7 @@ def make_image_option(
     callable
         Decorator for a command.
     """
-    kind = FilePath(dir_okay=False)
+    kind = PathParameterType(dir_okay=False)
     return click.option(
         option_name, type=kind, callback=_check_image_path, default=default, help=help_text
     )
@@ -407,7 +411,7 @@ rig_options = combine_option_decorators(
     )
 )
 
-columns_option = click.option(
+record_columns_option = click.option(
     "--columns",
     metavar="NAME=HEADING,...",
     help="Columns of the record. NAME is 'time', 'displacement', 'slip', 'friction', "

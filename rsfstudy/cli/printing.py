@@ -30,7 +30,7 @@ def print_line(text: str, style: str = "", soft_wrap: bool = False) -> None:
     stdout_console.print(text, style=style or None, soft_wrap=soft_wrap)
 
 
-def print_note(text: str) -> None:
+def print_on_stderr(text: str) -> None:
     """Print text to the standard error.
 
     Parameters
@@ -43,7 +43,7 @@ def print_note(text: str) -> None:
     stderr_console.print(text)
 
 
-def print_pieces(pieces: Iterable[SummaryTableOrSentence]) -> None:
+def print_tables_and_sentences(tables_and_sentences: Iterable[SummaryTableOrSentence]) -> None:
     """Print tables, lists of headings and values, and sentences.
 
     Parameters
@@ -51,7 +51,7 @@ def print_pieces(pieces: Iterable[SummaryTableOrSentence]) -> None:
     pieces : iterable of (TextTable, mapping of str to str, or str)
         Items to print. Empty tables and empty mappings are not printed.
     """
-    from rsfstudy.cli.table_layout import print_summary_piece
+    from rsfstudy.cli.table_layout import print_table_or_sentence
 
-    for piece in pieces:
-        print_summary_piece(piece)
+    for piece in tables_and_sentences:
+        print_table_or_sentence(piece)

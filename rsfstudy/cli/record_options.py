@@ -10,14 +10,14 @@ import click
 from rsfstudy.cli.options import (
     CommandOptions,
     DecoratedFunction,
-    columns_option,
     combine_option_decorators,
     normal_stress_option,
+    record_columns_option,
 )
 from rsfstudy.errors import InvalidValue
 
 #: Names of command-line options that are passed unchanged to the functions that read records.
-_OPTIONS_PASSED_UNCHANGED = ("decimal", "sheet", "area", "begin", "end", "thin", "filter")
+_READING_OPTIONS_PASSED_UNCHANGED = ("decimal", "sheet", "area", "begin", "end", "thin", "filter")
 
 
 def _parse_number_or_text(
@@ -57,8 +57,8 @@ def make_quantity_option(
     return click.option(option_name, callback=_parse_number_or_text, **about)
 
 
-reading_options = combine_option_decorators(
-    columns_option,
+record_reading_options = combine_option_decorators(
+    record_columns_option,
     normal_stress_option,
     click.option(
         "--decimal",
@@ -114,7 +114,7 @@ reading_options = combine_option_decorators(
 )
 
 
-def collect_reading_options(given: CommandOptions) -> dict[str, Any]:
+def collect_record_reading_options(command_options: CommandOptions) -> dict[str, Any]:
     """Return the keyword arguments of the functions that read records.
 
     Parameters
@@ -135,14 +135,14 @@ def collect_reading_options(given: CommandOptions) -> dict[str, Any]:
     from rsfstudy.cli.assignment_parsing import parse_column_assignments
 
     return {
-        "columns": parse_column_assignments(given.columns),
-        "normal_stress": given.normal_stress,
-        "rows": None if given.rows is None else _parse_rows(given.rows),
-        **given.collect_option_values(*_OPTIONS_PASSED_UNCHANGED),
+        "columns": parse_column_assignments(command_options.columns),
+        "normal_stress": command_options.normal_stress,
+        "rows": None if command_options.rows is None else _parse_row_numbers(command_options.rows),
+        **command_options.collect_option_values(*_READING_OPTIONS_PASSED_UNCHANGED),
     }
 
 
-def _parse_rows(text: str) -> tuple[int, ...]:
+def _parse_row_numbers(text: str) -> tuple[int, ...]:
     """Convert the value of the option ``--rows``."""
     numbers = [part.strip() for part in text.split(",")]
     if not all(number.isdecimal() and len(number) < 16 for number in numbers):

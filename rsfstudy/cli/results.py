@@ -18,7 +18,7 @@ from rsfstudy.errors import RunError
 
 EXIT_STATUS_OK, EXIT_STATUS_FAILED = 0, 1
 #: Version of the JSON format. The version is increased if a key is removed, renamed or redefined.
-JSON_FORMAT = 1
+JSON_FORMAT_VERSION = 1
 
 
 class CommandResult(ABC):
@@ -30,7 +30,7 @@ class CommandResult(ABC):
         """Exit status of the command."""
 
     @abstractmethod
-    def json_fields(self) -> Mapping[str, Any]:
+    def to_json_fields(self) -> Mapping[str, Any]:
         """Return the fields of the JSON output.
 
         Returns
@@ -40,10 +40,12 @@ class CommandResult(ABC):
         """
 
 
-Result = TypeVar("Result", bound=CommandResult)
+AnyCommandResult = TypeVar("Result", bound=CommandResult)
 
 
-def output_result(result: Result, print_result: Callable[[Result], None], as_json: bool) -> int:
+def print_result_as_text_or_json(
+    result: AnyCommandResult, print_as_text: Callable[[AnyCommandResult], None], as_json: bool
+) -> int:
     """Print a result as text or as JSON.
 
     Parameters
@@ -66,16 +68,16 @@ def output_result(result: Result, print_result: Callable[[Result], None], as_jso
         If the output cannot be written, for example because the disk is full.
     """
     if not as_json:
-        print_result(result)
+        print_as_text(result)
         return result.exit_status
     import json
 
     about = {
         "command": click.get_current_context().info_name,
-        "format": JSON_FORMAT,
+        "format": JSON_FORMAT_VERSION,
         "exit_status": result.exit_status,
     }
-    text = json.dumps(to_json_value(about | {**result.json_fields()}), indent=2, allow_nan=False)
+    text = json.dumps(to_json_value(about | {**result.to_json_fields()}), indent=2, allow_nan=False)
     try:
         click.echo(text)
     except OSError as error:

@@ -10,10 +10,10 @@ from typing import Any
 
 from rsfstudy import Study
 from rsfstudy.cli import cost_estimates
-from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult
 from rsfstudy.execution import CellPlan
-from rsfstudy.formatting import pluralize
+from rsfstudy.formatting import format_count_with_noun
 from rsfstudy.reporting import describe_scene_and_rig_fields
 from rsfstudy.rig import Rig
 
@@ -39,33 +39,33 @@ class StudyDeclaration(CommandResult):
     exit_status = EXIT_STATUS_OK
 
     @cached_property
-    def plan(self) -> CellPlan:
+    def cell_plan(self) -> CellPlan:
         """Plan of the cells of the study."""
         return CellPlan(self.study)
 
     @cached_property
-    def varied_fields(self) -> set[str]:
+    def varied_field_names(self) -> set[str]:
         """Names of the scene fields and measure fields that differ between cells."""
         varied = {field for axis in self.study.axes for field in axis.fields}
-        if self.study.scene_builder:
-            scales = self.study.scene_builder.build_scale_coordinates()
+        if self.study.axis_unit_converter:
+            scales = self.study.axis_unit_converter.compute_scale_and_field_coordinates()
             varied |= {name for name, (dims, _values) in scales.items() if dims}
         return varied
 
     @property
-    def measure_fields(self) -> dict[str, Any]:
+    def fixed_measure_fields(self) -> dict[str, Any]:
         """Fields of the measure that have the same value in all cells."""
         fields = self.study.measure.describe().items()
-        return {name: value for name, value in fields if name not in self.varied_fields}
+        return {name: value for name, value in fields if name not in self.varied_field_names}
 
     @property
     def rig_quantities(self) -> Mapping[str, float]:
         """Quantities of the rig in SI units."""
         return self.study.rig.as_dict() if self.study.rig else {}
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        study, varied = self.study, self.varied_fields
+        study, varied = self.study, self.varied_field_names
         variables = study.measure.variables
         return {
             "kind": "study",
@@ -82,7 +82,7 @@ class StudyDeclaration(CommandResult):
                 n: self.rig_quantities[n]
                 for n in Rig.convert_quantities_for_display(self.rig_quantities, varied)
             },
-            "measure": self.measure_fields,
+            "measure": self.fixed_measure_fields,
             "outputs": [
                 {"name": name, "has_error": f"{name}_error" in variables}
                 for name in variables
@@ -91,12 +91,14 @@ class StudyDeclaration(CommandResult):
             "reductions": [reduction.describe()["name"] for reduction in study.reductions],
             "claims": list(dict.fromkeys(claim.id for claim in study.claims)),
             "cells": study.size,
-            "distinct_cells": len(self.plan.unique_cell_numbers),
-            **cost_estimates.collect_cost_fields(self.plan, self.output_directory),
+            "distinct_cells": len(self.cell_plan.unique_cell_numbers),
+            **cost_estimates.collect_accuracy_and_cost_fields(
+                self.cell_plan, self.output_directory
+            ),
         }
 
 
-def print_study_declaration(declared: StudyDeclaration) -> None:
+def print_study_declaration(declaration: StudyDeclaration) -> None:
     """Print the declaration of a study and its expected cost.
 
     Parameters
@@ -104,31 +106,34 @@ def print_study_declaration(declared: StudyDeclaration) -> None:
     declared : StudyDeclaration
         Declaration to print.
     """
-    study = declared.study
+    study = declaration.study
     print_line(f"{study.name}: {study.title}\n", style="bold")
     if study.summary:
         print_line(study.summary + "\n")
     measured = {
         name: f"{len(value)} values" if isinstance(value, tuple | list) else value
-        for name, value in declared.measure_fields.items()
+        for name, value in declaration.fixed_measure_fields.items()
     }
     gives = study.measure.variables
     with_errors = {n: " (with its error)" * (f"{n}_error" in gives) for n in gives}
-    different = len(declared.plan.unique_cell_numbers)
+    different = len(declaration.cell_plan.unique_cell_numbers)
     others = f" ({different:,} of them different)" if different < study.size else ""
     costs = (
-        cost_estimates.describe_study_cost(declared.plan, declared.output_directory),
-        cost_estimates.compiled_engine_hint(declared.plan, declared.output_directory),
+        cost_estimates.describe_study_cost(declaration.cell_plan, declaration.output_directory),
+        cost_estimates.suggest_compiled_engine(declaration.cell_plan, declaration.output_directory),
     )
     about = {
         **{
-            f"axis {axis.dimension} ({pluralize(len(axis), 'value')})": _format_axis_points(
+            f"axis {axis.dimension} ({format_count_with_noun(len(axis), 'value')})": _format_axis_points(
                 axis.point_names
             )
             for axis in study.axes
         },
         **describe_scene_and_rig_fields(
-            "fixed fields", study.base.as_dict(), declared.rig_quantities, declared.varied_fields
+            "fixed fields",
+            study.base.as_dict(),
+            declaration.rig_quantities,
+            declaration.varied_field_names,
         ),
         "measure": ", ".join(f"{n} = {v}" for n, v in measured.items()),
         "outputs": ", ".join(f"{n}{w}" for n, w in with_errors.items() if not n.endswith("_error")),
@@ -137,7 +142,7 @@ def print_study_declaration(declared: StudyDeclaration) -> None:
         "cells": f"{study.size:,}{others}",
         "cost": "; ".join(filter(None, costs)),
     }
-    print_pieces([{name: text or "-" for name, text in about.items()}])
+    print_tables_and_sentences([{name: text or "-" for name, text in about.items()}])
 
 
 def _format_axis_points(axis_points: Sequence[str]) -> str:

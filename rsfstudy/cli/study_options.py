@@ -17,10 +17,10 @@ from rsfstudy.cli.options import CommandOptions
 from rsfstudy.execution import WorkerPool, connect_to_cluster
 from rsfstudy.rig import Rig, parse_number
 from rsfstudy.storage import read_dataset
-from rsfstudy.study import convert_study_to_rig_units, load_study, study_names
+from rsfstudy.study import convert_study_to_rig_units, list_study_names, load_study
 
 
-def selected_study_names(options: CommandOptions) -> list[str]:
+def list_selected_study_names(command_options: CommandOptions) -> list[str]:
     """Return the requested study name or file, or the names of all studies.
 
     Parameters
@@ -38,12 +38,12 @@ def selected_study_names(options: CommandOptions) -> list[str]:
     click.UsageError
         If the user passed both a name and ``--all``, or neither of them.
     """
-    if options.every == (options.name is not None):
+    if command_options.every == (command_options.name is not None):
         raise click.UsageError("Pass either the name of a study or --all, not both.")
-    return list(study_names()) if options.every else [options.name]
+    return list(list_study_names()) if command_options.every else [command_options.name]
 
 
-def build_study_from_options(study_name: str, options: CommandOptions) -> Study:
+def build_study_from_options(study_name: str, command_options: CommandOptions) -> Study:
     """Load a study, and apply the values of ``--set`` and the rig options.
 
     If the rig has a stiffness and the study has a stiffness axis, the stiffness of the rig replaces
@@ -66,12 +66,12 @@ def build_study_from_options(study_name: str, options: CommandOptions) -> Study:
     InvalidValue
         If an option is invalid.
     """
-    study, stated = load_study(study_name), options.rig_option_texts
+    study, stated = load_study(study_name), command_options.rig_option_texts
     varied = {field for axis in study.axes for field in axis.fields}
     taken = {"load_velocity", *(["stiffness"] * bool(varied & {"stiffness", "stiffness_ratio"}))}
     if {*stated} - taken and study.rig is None:
         rig = {name: text for name, text in stated.items() if name not in taken}
-        study = convert_study_to_rig_units(study, assignment_parsing.parse_rig(rig))
+        study = convert_study_to_rig_units(study, assignment_parsing.build_rig_from_options(rig))
         study = replace(study, overrides={**study.overrides, **rig})
         stated = {name: text for name, text in stated.items() if name in taken}
     in_si = {
@@ -79,14 +79,16 @@ def build_study_from_options(study_name: str, options: CommandOptions) -> Study:
         **{name: about.si_units for name, about in Rig.QUANTITIES.items()},
     }
     texts = {n: t if parse_number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
-    changes = texts | assignment_parsing.parse_overrides(study, options.settings)
+    changes = texts | assignment_parsing.parse_overrides(study, command_options.settings)
     return apply_overrides_to_study(
-        study, changes, **options.collect_option_values("rtol", "engine", "budget")
+        study, changes, **command_options.collect_option_values("rtol", "engine", "budget")
     )
 
 
 @contextlib.contextmanager
-def open_worker_pool(options: CommandOptions, log_path: Path | None = None) -> Iterator[WorkerPool]:
+def open_worker_pool(
+    command_options: CommandOptions, log_path: Path | None = None
+) -> Iterator[WorkerPool]:
     """Open the worker pool that computes the cells.
 
     Parameters
@@ -106,12 +108,16 @@ def open_worker_pool(options: CommandOptions, log_path: Path | None = None) -> I
     click.UsageError
         If the options are contradictory.
     """
-    if options.serial and options.scheduler:
+    if command_options.serial and command_options.scheduler:
         raise click.UsageError("--serial and --scheduler cannot be combined. Omit one of them.")
     nowhere = contextlib.nullcontext()
-    with nowhere if options.scheduler is None else connect_to_cluster(options.scheduler) as client:
-        processes = 0 if options.serial else options.workers
-        with WorkerPool(processes, client, options.time_limit, log_path) as workers:
+    with (
+        nowhere
+        if command_options.scheduler is None
+        else connect_to_cluster(command_options.scheduler) as client
+    ):
+        processes = 0 if command_options.serial else command_options.workers
+        with WorkerPool(processes, client, command_options.time_limit, log_path) as workers:
             yield workers
 
 

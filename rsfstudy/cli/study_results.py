@@ -15,15 +15,15 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy import check
-from rsfstudy.cli.printing import print_line, print_pieces
-from rsfstudy.formatting import format_overrides, pluralize
-from rsfstudy.former_data_names import NEW_VERDICT_COLUMNS
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
+from rsfstudy.formatting import format_count_with_noun, format_overrides
+from rsfstudy.former_data_names import NEW_VERDICT_COLUMN_BY_FORMER_COLUMN
 from rsfstudy.reporting import (
     TextTable,
-    claims_table,
+    build_claims_table,
+    build_failed_cells_table,
     count_pending_cells,
-    count_verdicts,
-    failures_table,
+    format_verdict_counts,
     summarise_study_as_fields,
 )
 from rsfstudy.storage import StoredDataset
@@ -44,10 +44,10 @@ class StudyResults:
     """
 
     dataset: xr.Dataset
-    file: str
+    file_path: str
 
     @property
-    def name(self) -> str:
+    def study_name(self) -> str:
         """Name of the study."""
         return str(self.dataset.attrs["id"])
 
@@ -57,26 +57,26 @@ class StudyResults:
         return StoredDataset(self.dataset).declaration.overrides
 
     @property
-    def pending_count(self) -> int:
+    def pending_cell_count(self) -> int:
         """Number of cells that have not been computed."""
         return count_pending_cells(self.dataset)
 
     @cached_property
-    def failures(self) -> TextTable:
+    def failed_cells_table(self) -> TextTable:
         """Table of the first failed cells."""
-        return failures_table(self.dataset, self.file)
+        return build_failed_cells_table(self.dataset, self.file_path)
 
     @property
-    def is_complete(self) -> bool:
+    def is_complete_without_failures(self) -> bool:
         """True if all cells have been computed and no cell failed."""
-        return not (self.pending_count or self.failures.rows)
+        return not (self.pending_cell_count or self.failed_cells_table.rows)
 
     @cached_property
     def verdicts(self) -> pd.DataFrame:
         """Table of the claims of the study and their verdicts."""
         return check(self.dataset)
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output that describe one study.
 
         Returns
@@ -84,10 +84,10 @@ class StudyResults:
         dict of str to object
             Number of cells by status, reductions, missing reductions and failed cells.
         """
-        return summarise_study_as_fields(self.dataset, self.file)
+        return summarise_study_as_fields(self.dataset, self.file_path)
 
 
-def collect_verdicts(studies: Sequence[StudyResults]) -> pd.DataFrame:
+def collect_verdicts(study_results: Sequence[StudyResults]) -> pd.DataFrame:
     """Collect the verdicts on the claims of one study or of several studies.
 
     Parameters
@@ -101,9 +101,9 @@ def collect_verdicts(studies: Sequence[StudyResults]) -> pd.DataFrame:
         Table of the verdicts. The table of several studies has the column ``study`` and is sorted
         by the numbers in the identifiers of the claims.
     """
-    if len(studies) == 1:
-        return studies[0].verdicts
-    together = pd.concat([one.verdicts.assign(study=one.name) for one in studies])
+    if len(study_results) == 1:
+        return study_results[0].verdicts
+    together = pd.concat([one.verdicts.assign(study=one.study_name) for one in study_results])
     if "note" in together:  # Studies without notes have no such column.
         together["note"] = together["note"].fillna("")
     number = together["id"].astype(str).str.extract(r"(\d+)", expand=False).astype(float)
@@ -130,12 +130,12 @@ def verdicts_to_json(verdicts: pd.DataFrame, study_name: str = "") -> list[dict[
     return [
         {"study": study_name}
         | {str(key): value for key, value in row.items()}
-        | {former: row[new] for former, new in NEW_VERDICT_COLUMNS.items()}
+        | {former: row[new] for former, new in NEW_VERDICT_COLUMN_BY_FORMER_COLUMN.items()}
         for row in rows
     ]
 
 
-def print_study_name(results: StudyResults) -> None:
+def print_study_heading(results: StudyResults) -> None:
     """Print the name of a study, its completeness and its overrides.
 
     Parameters
@@ -143,7 +143,7 @@ def print_study_name(results: StudyResults) -> None:
     results : StudyResults
         Results of the study.
     """
-    print_line(f"{results.name} ({results.dataset.attrs['completeness']})", style="bold")
+    print_line(f"{results.study_name} ({results.dataset.attrs['completeness']})", style="bold")
     if results.overrides:
         print_line(f"overrides: {format_overrides(results.overrides)}")
 
@@ -158,9 +158,9 @@ def print_verdicts(verdicts: pd.DataFrame) -> None:
     """
     checked = int((verdicts["verdict"] != Claim.NOT_APPLICABLE).sum())
     if checked:
-        print_pieces([claims_table(verdicts)])
+        print_tables_and_sentences([build_claims_table(verdicts)])
     print_unexpected_verdicts(verdicts)
-    line = f"{checked} of {pluralize(len(verdicts), 'claim')} checked: {count_verdicts(verdicts)}"
+    line = f"{checked} of {format_count_with_noun(len(verdicts), 'claim')} checked: {format_verdict_counts(verdicts)}"
     print_line(line if len(verdicts) else "no claims")
 
 
@@ -178,7 +178,7 @@ def print_unexpected_verdicts(verdicts: pd.DataFrame) -> None:
             print_line(f"{row.id}: {note}", style="yellow")
 
 
-def print_failures(results: StudyResults, with_commands: bool = True) -> None:
+def print_failed_cells(results: StudyResults, with_rerun_commands: bool = True) -> None:
     """Print the failed cells, and a command that reproduces each failed cell.
 
     Parameters
@@ -188,12 +188,12 @@ def print_failures(results: StudyResults, with_commands: bool = True) -> None:
     with_commands : bool, default: True
         If False, the function does not print the commands.
     """
-    if results.pending_count:
-        cells = pluralize(results.dataset["status"].size, "cell")
-        text = f"{results.pending_count} of {cells} have not been computed yet"
+    if results.pending_cell_count:
+        cells = format_count_with_noun(results.dataset["status"].size, "cell")
+        text = f"{results.pending_cell_count} of {cells} have not been computed yet"
         print_line(text, style="red")
-    print_pieces([results.failures])
-    if results.failures.rows and with_commands:
+    print_tables_and_sentences([results.failed_cells_table])
+    if results.failed_cells_table.rows and with_rerun_commands:
         print_line("to reproduce each cell in a single process:")
-        for row in results.failures.values:
+        for row in results.failed_cells_table.unformatted_rows:
             print_line(f"  {row['command']}", soft_wrap=True)

@@ -21,7 +21,7 @@ from rsfstudy.reporting import SummaryTableOrSentence, TextTable
 _CHARACTERS_BETWEEN_COLUMNS, _MIN_WIDTH_OF_PROSE_COLUMN = 2, 20
 
 
-def print_summary_piece(summary_piece: SummaryTableOrSentence) -> None:
+def print_table_or_sentence(table_or_sentence: SummaryTableOrSentence) -> None:
     """Print a table, a list of headings and values, or a sentence.
 
     Parameters
@@ -29,12 +29,12 @@ def print_summary_piece(summary_piece: SummaryTableOrSentence) -> None:
     summary_piece : TextTable, mapping of str to str, or str
         Text to print. Empty tables and empty mappings are not printed.
     """
-    if isinstance(summary_piece, str):
-        stdout_console.print(summary_piece)
-    elif isinstance(summary_piece, TextTable):
-        _print_table(summary_piece)
-    elif summary_piece:
-        row = _make_row_printable(summary_piece)
+    if isinstance(table_or_sentence, str):
+        stdout_console.print(table_or_sentence)
+    elif isinstance(table_or_sentence, TextTable):
+        _print_table(table_or_sentence)
+    elif table_or_sentence:
+        row = _make_row_printable(table_or_sentence)
         _print_row_as_list(row, set(row), "")
 
 
@@ -49,20 +49,22 @@ def _print_table(table: TextTable) -> None:
         set(map(make_text_printable, table.wrappable_columns)),
     )
     heads, columns = list(rows[0]), list(zip(*(row.values() for row in rows), strict=True))
-    least = [_min_column_width(h, c, h in prose) for h, c in zip(heads, columns, strict=True)]
+    least = [
+        _compute_min_column_width(h, c, h in prose) for h, c in zip(heads, columns, strict=True)
+    ]
     most = [max(map(cell_len, (h, *c))) for h, c in zip(heads, columns, strict=True)]
     room = stdout_console.width - _CHARACTERS_BETWEEN_COLUMNS * (len(heads) - 1)
     if sum(least) > room:
-        for row, style in zip(rows, table.row_colours or [""] * len(rows), strict=True):
+        for row, style in zip(rows, table.last_cell_colours or [""] * len(rows), strict=True):
             _print_row_as_list(row, prose, style)
         return
     printed = rich_table.Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     printed.pad_edge = False
-    widths = _distribute_widths(least, most, room)
+    widths = _distribute_column_widths(least, most, room)
     for head, column, width in zip(heads, columns, widths, strict=True):
-        side = "right" if all(map(_is_number_text, column)) else "left"
+        side = "right" if all(map(_is_number_or_dash, column)) else "left"
         printed.add_column(Text(head), width=width, justify=side)  # type: ignore[arg-type]
-    for row, style in zip(rows, table.row_colours or [""] * len(rows), strict=True):
+    for row, style in zip(rows, table.last_cell_colours or [""] * len(rows), strict=True):
         *texts, last = row.values()
         printed.add_row(*map(Text, texts), Text(last, style=style))
     stdout_console.print(printed)
@@ -82,7 +84,7 @@ def _print_row_as_list(row: Mapping[str, str], prose_columns: Collection[str], s
     wide = max(map(cell_len, row))
     room = stdout_console.width - wide - _CHARACTERS_BETWEEN_COLUMNS
     beside = all(
-        _longest_unbreakable_length(text, head in prose_columns) <= room
+        _compute_longest_unbreakable_length(text, head in prose_columns) <= room
         for head, text in row.items()
     )
     lines = rich_table.Table.grid(padding=(0, _CHARACTERS_BETWEEN_COLUMNS, 0, 0))
@@ -97,7 +99,7 @@ def _print_row_as_list(row: Mapping[str, str], prose_columns: Collection[str], s
     stdout_console.print()
 
 
-def _longest_unbreakable_length(text: str, is_prose: bool) -> int:
+def _compute_longest_unbreakable_length(text: str, is_prose: bool) -> int:
     """Return the length of the longest unbreakable piece of a string.
 
     Prose can be split between words. A number or a name cannot be split.
@@ -105,18 +107,18 @@ def _longest_unbreakable_length(text: str, is_prose: bool) -> int:
     return max(map(cell_len, text.split() if is_prose else [text]), default=0)
 
 
-def _min_column_width(heading: str, cell_texts: Sequence[str], is_prose: bool) -> int:
+def _compute_min_column_width(heading: str, cell_texts: Sequence[str], is_prose: bool) -> int:
     """Return the minimum width of a column.
 
     Headings may be split between words.
     """
-    needed = max(_longest_unbreakable_length(text, is_prose) for text in cell_texts)
+    needed = max(_compute_longest_unbreakable_length(text, is_prose) for text in cell_texts)
     if is_prose:
         needed = max(needed, min(_MIN_WIDTH_OF_PROSE_COLUMN, max(map(cell_len, cell_texts))))
-    return max(needed, _longest_unbreakable_length(heading, is_prose=True))
+    return max(needed, _compute_longest_unbreakable_length(heading, is_prose=True))
 
 
-def _distribute_widths(
+def _distribute_column_widths(
     min_widths: Sequence[int], max_widths: Sequence[int], total_width: int
 ) -> list[int]:
     """Distribute the available width among columns.
@@ -132,7 +134,7 @@ def _distribute_widths(
     return widths
 
 
-def _is_number_text(text: str) -> bool:
+def _is_number_or_dash(text: str) -> bool:
     """Return True if a string is empty, a dash, or a number."""
     try:
         float(text.strip("<> ").replace(",", ""))

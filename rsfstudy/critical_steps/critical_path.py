@@ -43,7 +43,7 @@ from rsfstudy.motion import (
     rise,
 )
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, A, B
-from rsfstudy.slider import FrictionFunctions, Function, MotionPoint, Numbers, Scene
+from rsfstudy.slider import FloatTuple, FrictionFunctions, MotionPoint, NumericFunction, Scene
 from rsfstudy.status import Status
 
 #: Maximum number of right-hand-side evaluations in the search for the start of a critical path. The
@@ -51,7 +51,7 @@ from rsfstudy.status import Status
 _MAX_EVALUATIONS_OF_PATH_START_SEARCH = 1_500
 #: Value of ln(V/V_*) below which the integration of a critical path is abandoned. The slip rate is
 #: about 1e-100 V_*.
-_MIN_LOG_SLIP_RATE = -230.0
+_MIN_LOG_SLIP_RATE_OF_CRITICAL_PATH = -230.0
 #: Minimum excess of ln V over the instability norm. A path with a larger excess is considered to
 #: touch the norm from above.
 _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM = 1e-6
@@ -85,12 +85,12 @@ class CriticalPath(NamedTuple):
     """
 
     log_slip_rate_at_instability_norm: float
-    min_frictional_stress: float
+    frictional_stress_at_zero_normal_stress: float
     radiated_stress_at_instability_norm: float
-    spring_stress_and_states_after_step: Numbers
-    parameters: Numbers
-    tangency_point_solver: Function
-    motion_point_evaluator: Function
+    spring_stress_and_states_after_step: FloatTuple
+    scene_parameter_values: FloatTuple
+    tangency_point_solver: NumericFunction
+    motion_point_evaluator: NumericFunction
     motion_driver: MotionDriver
     integrator: Integrator
     has_single_state_variable: bool
@@ -124,10 +124,10 @@ class CriticalPath(NamedTuple):
             scene.dynamics.radiated_stress(x),
             begin,
             slow.parameters,
-            prepare_scalar_function_for_engine(tangency, integrator.engine, x, x, slow.parameters)
+            compile_if_engine_is_compiled(tangency, integrator.engine, x, x, slow.parameters)
             if planar
             else tangency,
-            build_motion_point_evaluator(slow.rate_function, slow.point_function),
+            build_motion_point_evaluator(slow.rate_function, slow.motion_point_function),
             MotionDriver(slow, engine=integrator.engine, methods=integrator.accuracy.methods),
             integrator,
             planar,
@@ -146,7 +146,7 @@ class CriticalPath(NamedTuple):
         CriticalPath
             Critical path with the same instability norm and the same friction.
         """
-        p = list(self.parameters)
+        p = list(self.scene_parameter_values)
         p[LOAD_VELOCITY] = load_velocity
         p[LOG_LOAD_VELOCITY] = math.log(abs(load_velocity)) if load_velocity else -math.inf
         return self._replace(parameters=tuple(p))
@@ -163,14 +163,14 @@ class CriticalPath(NamedTuple):
             return None
         g, psi = self.tangency_point_solver(
             self.log_slip_rate_at_instability_norm,
-            (1.0 - 1e-6) * self.min_frictional_stress,
-            self.parameters,
+            (1.0 - 1e-6) * self.frictional_stress_at_zero_normal_stress,
+            self.scene_parameter_values,
         )
         return None if math.isnan(g) else (g + self.radiated_stress_at_instability_norm, psi)
 
-    def find_start_point(
+    def find_path_start_by_backward_integration(
         self,
-        tolerance: float,
+        local_tolerance: float,
         crossing_quantity_and_level: tuple[str, float],
         is_start_of_step: Callable[[MotionPoint], bool],
     ) -> MotionPoint | None:
@@ -194,18 +194,18 @@ class CriticalPath(NamedTuple):
             above, or if no start is found.
         """
         specs = (
-            *_end_events_of_path_search(self.log_slip_rate_at_instability_norm),
+            *_build_events_ending_path_start_search(self.log_slip_rate_at_instability_norm),
             rise(*crossing_quantity_and_level),
             fall(*crossing_quantity_and_level),
         )
-        for event in self._iterate_events_along_path(tolerance, specs, backward=True):
+        for event in self._iterate_events_along_path(local_tolerance, specs, backward=True):
             if event.specification in specs[2:] and is_start_of_step(event.point):
                 return event.point
         return None
 
     def _iterate_events_along_path(
         self,
-        tolerance: float,
+        local_tolerance: float,
         event_specs: Sequence[EventSpecification],
         *,
         backward: bool,
@@ -219,22 +219,24 @@ class CriticalPath(NamedTuple):
         start = self.tangency_point_at_instability_norm
         if start is None:
             return
-        enough = round(_MAX_EVALUATIONS_OF_PATH_START_SEARCH * math.pow(1e-5 / tolerance, 0.125))
+        enough = round(
+            _MAX_EVALUATIONS_OF_PATH_START_SEARCH * math.pow(1e-5 / local_tolerance, 0.125)
+        )
         try:
             yield from self.motion_driver.iterate_events(
                 start,
                 self.integrator.work_meter,
                 event_specs,
-                tolerance,
+                local_tolerance,
                 backward=backward,
-                parameters=self.parameters,
+                parameters=self.scene_parameter_values,
                 evaluation_budget=enough,
             )
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
 
-    def compute_state_misfit_at_path_start(self, tolerance: float) -> float | None:
+    def compute_state_misfit_at_path_start(self, local_tolerance: float) -> float | None:
         """Compute the misfit of the state at the start of the path.
 
         The misfit is the value of Psi/a at the point at which the slip rate of the path equals the
@@ -252,20 +254,20 @@ class CriticalPath(NamedTuple):
             Misfit, or None if the path does not pass the initial slip rate in the same direction as
             the motion.
         """
-        given = self.spring_stress_and_states_after_step, self.parameters
-        begin = prepare_scalar_function_for_engine(
+        given = self.spring_stress_and_states_after_step, self.scene_parameter_values
+        begin = compile_if_engine_is_compiled(
             self.motion_point_evaluator, self.integrator.engine, *given
         )(*given)
         if begin.log_slip_rate_derivative == 0.0:
             return None
-        start = self.find_start_point(
-            tolerance,
+        start = self.find_path_start_by_backward_integration(
+            local_tolerance,
             ("log_slip_rate", begin.log_slip_rate),
             lambda point: point.log_slip_rate_derivative * begin.log_slip_rate_derivative > 0.0,
         )
-        return None if start is None else start.psi / self.parameters[A]
+        return None if start is None else start.psi / self.scene_parameter_values[A]
 
-    def compute_next_peak_height_above_norm(self, tolerance: float) -> float | None:
+    def compute_next_peak_height_above_norm(self, local_tolerance: float) -> float | None:
         """Compute the height of the next ln V peak above the instability norm.
 
         The motion starts at the tangency point and is integrated forwards for one orbit. The
@@ -281,12 +283,12 @@ class CriticalPath(NamedTuple):
         float or None
             Misfit, or None if ln V has no further peak.
         """
-        for event in self._iterate_events_after_fall_below_load_rate(tolerance):
+        for event in self._iterate_events_after_fall_below_load_rate(local_tolerance):
             if event.kind is EventKind.MAXIMUM:
                 return event.point.log_slip_rate - self.log_slip_rate_at_instability_norm
         return None
 
-    def next_peak_exceeds_norm(self, tolerance: float) -> bool:
+    def next_peak_exceeds_norm(self, local_tolerance: float) -> bool:
         """Return True if the next peak of ln V exceeds the instability norm.
 
         If the next peak of ln V exceeds the instability norm, other motions may reach the norm at
@@ -307,7 +309,7 @@ class CriticalPath(NamedTuple):
             "log_slip_rate",
             self.log_slip_rate_at_instability_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM,
         )
-        for event in self._iterate_events_after_fall_below_load_rate(tolerance, beyond):
+        for event in self._iterate_events_after_fall_below_load_rate(local_tolerance, beyond):
             if event.kind in (EventKind.RISE, EventKind.MAXIMUM):
                 # A time step may contain the rise above the norm and the following peak.
                 return (
@@ -317,7 +319,7 @@ class CriticalPath(NamedTuple):
         return False
 
     def _iterate_events_after_fall_below_load_rate(
-        self, tolerance: float, *event_specs: EventSpecification
+        self, local_tolerance: float, *event_specs: EventSpecification
     ) -> Iterator[Event]:
         """Yield the events of the forward motion after V has fallen below V_0.
 
@@ -327,26 +329,37 @@ class CriticalPath(NamedTuple):
         asked = (
             *event_specs,
             maximum("log_slip_rate"),
-            fall("log_slip_rate", self.parameters[LOG_LOAD_VELOCITY], may_defer=True),
+            fall(
+                "log_slip_rate",
+                self.scene_parameter_values[LOG_LOAD_VELOCITY],
+                may_report_later=True,
+            ),
         )
-        for event in self._iterate_events_along_path(tolerance, asked, backward=False):
+        for event in self._iterate_events_along_path(local_tolerance, asked, backward=False):
             if fallen:
                 yield event
             fallen = fallen or event.kind is EventKind.FALL
 
 
 @lru_cache(maxsize=256)
-def _end_events_of_path_search(log_slip_rate_at_norm: float) -> tuple[EventSpecification, ...]:
+def _build_events_ending_path_start_search(
+    log_slip_rate_at_norm: float,
+) -> tuple[EventSpecification, ...]:
     """Return the events at which the search for the start of a path fails."""
     above_norm = log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM
     return (
-        rise("log_slip_rate", above_norm, terminal=True, may_defer=True),
-        fall("log_slip_rate", _MIN_LOG_SLIP_RATE, terminal=True, may_defer=True),
+        rise("log_slip_rate", above_norm, terminal=True, may_report_later=True),
+        fall(
+            "log_slip_rate",
+            _MIN_LOG_SLIP_RATE_OF_CRITICAL_PATH,
+            terminal=True,
+            may_report_later=True,
+        ),
     )
 
 
 @cache
-def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Function:
+def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> NumericFunction:
     r"""Build the function that solves for the tangency point.
 
     The function ``(x, weakest, p) -> (g, Psi)`` returns the frictional stress g and the state Psi
@@ -364,9 +377,9 @@ def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Funct
 
     with :math:`K = k D_c/\sigma_*`. This equation for :math:`g` is solved by Brent's method.
     """
-    strength, evolutions = friction_functions.strength, friction_functions.evolutions
+    strength, evolutions = friction_functions.strength, friction_functions.state_evolutions
 
-    def acceleration(g: float, at: tuple[float, Numbers]) -> float:
+    def acceleration(g: float, at: tuple[float, FloatTuple]) -> float:
         x, p = at
         value, slope, shift, _shift_slope = strength(g, (0.0,), p)
         pull = p[STIFFNESS] * math.expm1(p[LOG_LOAD_VELOCITY] - x)
@@ -375,7 +388,7 @@ def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Funct
 
     root = build_root_finder(acceleration)
 
-    def tangency(x: float, weakest: float, p: Numbers) -> tuple[float, float]:
+    def tangency(x: float, weakest: float, p: FloatTuple) -> tuple[float, float]:
         at = x, p
         highest = 2.0 * p[B] * abs(x) + p[STIFFNESS] * max(1.0, strength(0.0, (0.0,), p)[1])
         lowest = max(-highest, weakest)
@@ -393,7 +406,9 @@ def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Funct
 
 
 @cache
-def build_motion_point_evaluator(rate_function: Function, point_function: Function) -> Function:
+def build_motion_point_evaluator(
+    rate_function: NumericFunction, point_function: NumericFunction
+) -> NumericFunction:
     """Build a function ``(state, p) -> MotionPoint`` that evaluates a point.
 
     Parameters
@@ -409,15 +424,15 @@ def build_motion_point_evaluator(rate_function: Function, point_function: Functi
         Function ``(state, p) -> MotionPoint``.
     """
 
-    def at(state: Numbers, p: Numbers) -> MotionPoint:
+    def at(state: FloatTuple, p: FloatTuple) -> MotionPoint:
         now: MotionPoint = point_function(state, rate_function(state, p), p)
         return now
 
     return at
 
 
-def prepare_scalar_function_for_engine(
-    function: Callable[..., Any], engine: str, *arguments: float | Numbers
+def compile_if_engine_is_compiled(
+    function: Callable[..., Any], engine: str, *arguments: float | FloatTuple
 ) -> Any:
     """Compile a function if the engine is the compiled engine.
 
@@ -436,7 +451,7 @@ def prepare_scalar_function_for_engine(
         The compiled function, or ``function`` itself if the engine is not the compiled engine.
     """
     return (
-        Engine.import_compiled().compile_scalar_function(function, *arguments)
+        Engine.import_compiled_engine().compile_scalar_function(function, *arguments)
         if engine == Engine.COMPILED
         else function
     )

@@ -13,9 +13,12 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.shooting_steps import LOCAL_TOLERANCE_OF_FIRST_ROOT, StepFamily
-from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
-from rsfstudy.critical_steps.stability_after_step import stability_margin
+from rsfstudy.critical_steps.shooting_steps import (
+    LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT,
+    LoadingStepFamily,
+)
+from rsfstudy.critical_steps.slow_manifold_accuracy import estimate_slow_manifold_relative_error
+from rsfstudy.critical_steps.stability_after_step import compute_stability_margin
 from rsfstudy.motion import Integrator
 
 #: Minimum error estimate of a critical step, divided by the requested relative accuracy. The
@@ -48,8 +51,8 @@ class CriticalStepSizeEstimate:
     found_from_limit_cycle: bool = False
 
 
-def find_boundary_by_critical_path(
-    step_family: StepFamily, integrator: Integrator
+def find_critical_size_by_critical_path(
+    step_family: LoadingStepFamily, integrator: Integrator
 ) -> CriticalStepSizeEstimate | None:
     """Find the critical step size from the critical path.
 
@@ -68,28 +71,28 @@ def find_boundary_by_critical_path(
     StepBoundary or None
         The boundary, or None if there is no critical path or if smaller steps may be unstable.
     """
-    boundary = _find_boundary_with_error(
-        step_family, step_family.find_sizes_by_critical_path, integrator
+    boundary = _find_critical_size_with_error(
+        step_family, step_family.iterate_sizes_by_critical_path, integrator
     )
     if boundary is None or not step_family.motions_after_smaller_steps_decay(boundary.step_size):
         return None
     # If all orbits are closed at the critical stiffness, a motion never returns to a higher peak.
     if step_family.scene.parts.law.has_closed_orbits:
         return boundary
-    scene = step_family.scene_with_step(boundary.step_size)
+    scene = step_family.build_scene_with_step(boundary.step_size)
     if scene.log_load_velocity == -math.inf:
         return boundary
     return (
         None
         if CriticalPath.from_scene(scene, integrator).next_peak_exceeds_norm(
-            LOCAL_TOLERANCE_OF_FIRST_ROOT
+            LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT
         )
         else boundary
     )
 
 
-def find_boundary_by_limit_cycle(
-    step_family: StepFamily, integrator: Integrator
+def find_critical_size_by_limit_cycle(
+    step_family: LoadingStepFamily, integrator: Integrator
 ) -> CriticalStepSizeEstimate | None:
     """Find the step size at which a limit cycle touches the instability norm.
 
@@ -109,22 +112,22 @@ def find_boundary_by_limit_cycle(
         The boundary, or None if there is no such limit cycle.
     """
     small, large = (
-        stability_margin(step_family.scene_with_step(size))
+        compute_stability_margin(step_family.build_scene_with_step(size))
         for size in (step_family.min_size, step_family.max_size)
     )
     if large >= 0.0 or small - large < integrator.result_tolerance(10.0):
         return None
-    boundary = _find_boundary_with_error(
-        step_family, step_family.find_sizes_by_limit_cycle, integrator
+    boundary = _find_critical_size_with_error(
+        step_family, step_family.iterate_sizes_by_limit_cycle, integrator
     )
     # A limit cycle attracts nearby motions weakly, so the errors of two runs may be similar.
     error = 5.0 * boundary.relative_error if boundary else math.nan
     return boundary and replace(boundary, relative_error=error, found_from_limit_cycle=True)
 
 
-def _find_boundary_with_error(
-    step_family: StepFamily,
-    find_sizes_by_tolerance: Callable[[Iterable[float], Integrator], Iterator[float]],
+def _find_critical_size_with_error(
+    step_family: LoadingStepFamily,
+    iterate_sizes_by_tolerance: Callable[[Iterable[float], Integrator], Iterator[float]],
     integrator: Integrator,
 ) -> CriticalStepSizeEstimate | None:
     """Find a boundary, and estimate its error from runs with several tolerances.
@@ -135,20 +138,24 @@ def _find_boundary_with_error(
     is None if the search finds no boundary between the smallest and the largest step size.
     """
     boundary = None
-    of_path = slow_manifold_relative_error(step_family.scene) if step_family.scene.has_mass else 0.0
+    of_path = (
+        estimate_slow_manifold_relative_error(step_family.scene)
+        if step_family.scene.has_mass
+        else 0.0
+    )
     for size, refined in itertools.pairwise(
-        find_sizes_by_tolerance(_decreasing_local_tolerances(integrator), integrator)
+        iterate_sizes_by_tolerance(_iterate_decreasing_local_tolerances(integrator), integrator)
     ):
         if not step_family.min_size <= size <= step_family.max_size:
             break
         error = integrator.estimate_error(size, refined, _MIN_ESTIMATED_ERROR_OVER_RTOL) / size
         boundary = CriticalStepSizeEstimate(size, error + of_path)
-        if error <= step_family.size_tolerance(size, integrator.result_tolerance()):
+        if error <= step_family.compute_step_size_tolerance(size, integrator.result_tolerance()):
             break
     return boundary
 
 
-def _decreasing_local_tolerances(integrator: Integrator) -> Iterator[float]:
+def _iterate_decreasing_local_tolerances(integrator: Integrator) -> Iterator[float]:
     """Yield local tolerances, each a tenth of the previous tolerance."""
     for _ in range(_MAX_LOCAL_TOLERANCES_TRIED_PER_PATH):
         if integrator.local_tolerance > Integrator.MIN_LOCAL_TOLERANCE:

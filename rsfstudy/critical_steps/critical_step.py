@@ -24,16 +24,16 @@ from scipy.optimize import toms748
 from rsfstudy.critical_steps import motion_after_step, stability_after_step
 from rsfstudy.critical_steps.critical_path_solution import (
     CriticalStepSizeEstimate,
-    find_boundary_by_critical_path,
-    find_boundary_by_limit_cycle,
+    find_critical_size_by_critical_path,
+    find_critical_size_by_limit_cycle,
 )
 from rsfstudy.critical_steps.loading_checks import (
     SLOW_INSTABILITY_NORM_WARNING_PREFIX,
+    build_norm_below_load_velocity_outcome,
     build_slow_instability_norm_warning,
     check_loading_is_single_step,
-    outcome_if_norm_is_below_load_velocity,
 )
-from rsfstudy.critical_steps.shooting_steps import StepFamily
+from rsfstudy.critical_steps.shooting_steps import LoadingStepFamily
 from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
 from rsfstudy.critical_steps.step_types import (
     DisplacementStepFamily,
@@ -48,7 +48,7 @@ from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-STEP_FAMILY_BY_QUANTITY: Mapping[str, type[StepFamily]] = {
+STEP_FAMILY_BY_SCENE_FIELD: Mapping[str, type[LoadingStepFamily]] = {
     "load_velocity_ratio": LoadVelocityStepFamily,
     "displacement_step": DisplacementStepFamily,
     "normal_stress_step": NormalStressStepFamily,
@@ -56,17 +56,17 @@ STEP_FAMILY_BY_QUANTITY: Mapping[str, type[StepFamily]] = {
 STEP_DIRECTIONS = ("up", "down")
 #: Aliases of scene fields. The names of the scene fields are the keys of
 #: ``STEP_FAMILY_BY_QUANTITY``.
-QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
+SCENE_FIELD_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Largest relative tolerance for the step size at which a limit cycle touches the instability norm.
-_MAX_RTOL_OF_LIMIT_CYCLE_BOUNDARY = 1e-8
+_MAX_STEP_SIZE_RTOL_BY_LIMIT_CYCLE = 1e-8
 
 #: Maximum width of a bracket that confirms a critical step, relative to the step size.
 _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE = 0.02
 
 #: Excess over the instability norm above which the first peak of a motion exceeds the norm before
 #: the motion can approach a limit cycle.
-_MIN_EXCESS_IF_FIRST_PEAK_REACHES_NORM = 0.1
+_MIN_NORM_EXCESS_REACHED_AT_FIRST_PEAK = 0.1
 
 #: Instability norm (limit of the dimensionless slip rate) at which the effect of inertia is
 #: negligible.
@@ -85,11 +85,11 @@ _QUASI_STATIC_CRITICAL_STIFFNESS = Output(
 
 
 @cache
-def _build_outputs_for_step_quantity(quantity: str) -> tuple[Output, ...]:
+def _build_outputs_for_stepped_field(stepped_field_name: str) -> tuple[Output, ...]:
     """Return the outputs of a critical step of a given type."""
-    critical = STEP_FAMILY_BY_QUANTITY[quantity].critical_output_name
+    critical = STEP_FAMILY_BY_SCENE_FIELD[stepped_field_name].critical_output_name
     confirmed = (f"{critical}_stable", f"{critical}_unstable")
-    beside = (*confirmed, *STEP_FAMILY_BY_QUANTITY[quantity].extra_output_names)
+    beside = (*confirmed, *STEP_FAMILY_BY_SCENE_FIELD[stepped_field_name].extra_output_names)
     return Output(critical, error=True), *map(Output, beside), _QUASI_STATIC_CRITICAL_STIFFNESS
 
 
@@ -161,13 +161,13 @@ class CriticalStep(Measure):
     def __post_init__(self) -> None:
         """Check the fields of the measure, and replace aliases."""
         if isinstance(self.of, str):
-            object.__setattr__(self, "of", QUANTITY_ALIASES.get(self.of, self.of))
-        if not isinstance(self.of, str) or self.of not in STEP_FAMILY_BY_QUANTITY:
+            object.__setattr__(self, "of", SCENE_FIELD_ALIASES.get(self.of, self.of))
+        if not isinstance(self.of, str) or self.of not in STEP_FAMILY_BY_SCENE_FIELD:
             raise InvalidValue(
                 "of",
                 self.of,
                 "is not the name of a step that the measure can compute",
-                choices=STEP_FAMILY_BY_QUANTITY,
+                choices=STEP_FAMILY_BY_SCENE_FIELD,
             )
         if self.direction not in STEP_DIRECTIONS:
             raise InvalidValue("direction", self.direction, "is unknown", choices=STEP_DIRECTIONS)
@@ -175,12 +175,12 @@ class CriticalStep(Measure):
     @property
     def primary_output(self) -> str:
         """Name of the main result, which is the critical step size."""
-        return STEP_FAMILY_BY_QUANTITY[self.of].critical_output_name
+        return STEP_FAMILY_BY_SCENE_FIELD[self.of].critical_output_name
 
     @property
     def outputs(self) -> Sequence[Output]:
         """Critical step, two steps that confirm the critical step, and other results."""
-        return _build_outputs_for_step_quantity(self.of)
+        return _build_outputs_for_stepped_field(self.of)
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
@@ -243,19 +243,19 @@ class CriticalStep(Measure):
             )
             raise InvalidValue("initial_state", scene.initial_state, rule, remedy=remedy)
         sign = 1 if self.direction == "up" else -1
-        steps = STEP_FAMILY_BY_QUANTITY[self.of](scene, sign)
+        steps = STEP_FAMILY_BY_SCENE_FIELD[self.of](scene, sign)
         if steps.max_size <= steps.min_size:
             rate = 0.0 if self.of == "load_velocity_ratio" else steps.scene.load_velocity
-            return outcome_if_norm_is_below_load_velocity(scene, rate)
+            return build_norm_below_load_velocity_outcome(scene, rate)
         below = (
             not stability_after_step.may_have_closed_orbits(scene)
-            or stability_after_step.stiffness_ratio_after_step(scene) < 1.0
+            or stability_after_step.compute_stiffness_ratio_after_step(scene) < 1.0
         )
         if (
             below
             and stability_after_step.has_frictional_damping_only(scene)
             and stability_after_step.is_neutrally_stable(
-                steps.scene_with_step(steps.max_size), integrator.result_tolerance(10.0)
+                steps.build_scene_with_step(steps.max_size), integrator.result_tolerance(10.0)
             )
         ):
             return Outcome(
@@ -268,30 +268,30 @@ class CriticalStep(Measure):
             return self._search_critical_step_upward(steps, integrator)
         if not inertia_matters_below_norm(scene, integrator):
             # A limit cycle attracts nearby paths weakly, so its boundary needs a smaller tolerance.
-            tight = integrator.tightened_to(_MAX_RTOL_OF_LIMIT_CYCLE_BOUNDARY)
+            tight = integrator.tightened_to(_MAX_STEP_SIZE_RTOL_BY_LIMIT_CYCLE)
             for find, own in (
-                (find_boundary_by_critical_path, integrator),
-                (find_boundary_by_limit_cycle, tight),
+                (find_critical_size_by_critical_path, integrator),
+                (find_critical_size_by_limit_cycle, tight),
             ):
                 boundary = find(steps, own)
                 if boundary is not None and not steps.inertia_shifts_critical_size(
                     boundary.step_size, own.result_tolerance()
                 ):
-                    outcome = self._confirm_boundary_by_motions(steps, boundary, own)
+                    outcome = self._confirm_critical_size_by_motions(steps, boundary, own)
                     if outcome.status is Status.OK:
                         return outcome
             return self._search_critical_step_upward(steps, integrator)
-        near = _critical_size_without_inertia(steps, integrator)
+        near = _compute_critical_size_without_inertia(steps, integrator)
         if near is not None and steps.motions_after_smaller_steps_decay(near):
             bracket = _bracket_critical_log_size(steps, near, integrator)
             if bracket is not None:
                 return self._refine_size_bracket(steps, bracket, integrator)
         return self._search_critical_step_upward(steps, integrator)
 
-    def _confirm_boundary_by_motions(
+    def _confirm_critical_size_by_motions(
         self,
-        step_family: StepFamily,
-        boundary: CriticalStepSizeEstimate,
+        step_family: LoadingStepFamily,
+        critical_size_estimate: CriticalStepSizeEstimate,
         integrator: Integrator,
     ) -> Outcome:
         """Confirm a critical step with motions after a smaller and a larger step.
@@ -305,70 +305,80 @@ class CriticalStep(Measure):
         step may be critical, because oscillations below the instability norm may grow.
         """
         first = (
-            boundary.relative_error
-            if boundary.found_from_forward_motions
-            else 3.0 * boundary.relative_error
+            critical_size_estimate.relative_error
+            if critical_size_estimate.found_from_forward_motions
+            else 3.0 * critical_size_estimate.relative_error
         )
         first = width = max(first, integrator.result_tolerance())
         while width < _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
-            inner, outer = boundary.step_size * (1.0 - width), boundary.step_size * (1.0 + width)
+            inner, outer = (
+                critical_size_estimate.step_size * (1.0 - width),
+                critical_size_estimate.step_size * (1.0 + width),
+            )
             below, above = (
                 _compute_excess_over_norm_after_step(step_family, size, integrator)
                 for size in (inner, outer)
             )
             if below is not None and above is not None and above >= 0.0 > below:
-                at_once = width == first and not boundary.found_from_forward_motions
-                relative = boundary.relative_error if at_once else width
-                error = step_family.compute_field_value_error(boundary.step_size, relative)
-                values = self._output_values(
+                at_once = width == first and not critical_size_estimate.found_from_forward_motions
+                relative = critical_size_estimate.relative_error if at_once else width
+                error = step_family.compute_field_value_error(
+                    critical_size_estimate.step_size, relative
+                )
+                values = self._build_output_values(
                     step_family,
-                    boundary.step_size,
+                    critical_size_estimate.step_size,
                     error,
                     step_family.step_size_to_field_value(inner),
                     step_family.step_size_to_field_value(outer),
                 )
-                load = step_family.scene_with_step(boundary.step_size).load_velocity
+                load = step_family.build_scene_with_step(
+                    critical_size_estimate.step_size
+                ).load_velocity
                 return Outcome(
                     Status.OK, values, build_slow_instability_norm_warning(step_family.scene, load)
                 )
-            if not (boundary.found_from_forward_motions or boundary.found_from_limit_cycle):
+            if not (
+                critical_size_estimate.found_from_forward_motions
+                or critical_size_estimate.found_from_limit_cycle
+            ):
                 break
             if (
-                boundary.found_from_limit_cycle
+                critical_size_estimate.found_from_limit_cycle
                 and below is not None
-                and below > _MIN_EXCESS_IF_FIRST_PEAK_REACHES_NORM
+                and below > _MIN_NORM_EXCESS_REACHED_AT_FIRST_PEAK
             ):
                 break
             width *= 10.0
         return Outcome(
             Status.UNVERIFIED,
-            self._output_values(step_family),
+            self._build_output_values(step_family),
             "a stable and an unstable step within 2 % could not be found for "
             f"{self.primary_output} = "
-            f"{step_family.step_size_to_field_value(boundary.step_size):.9g}",
+            f"{step_family.step_size_to_field_value(critical_size_estimate.step_size):.9g}",
         )
 
-    def _output_values(
+    def _build_output_values(
         self,
-        step_family: StepFamily,
+        step_family: LoadingStepFamily,
         step_size: float = math.nan,
-        value_error: float = math.nan,
-        stable_value: float = math.nan,
-        unstable_value: float = math.nan,
+        field_value_error: float = math.nan,
+        stable_field_value: float = math.nan,
+        unstable_field_value: float = math.nan,
     ) -> dict[str, float]:
         """Return the results by name. The values of missing results are NaN."""
         of = self.primary_output
         return {
             of: step_family.step_size_to_field_value(step_size),
-            f"{of}_error": value_error,
-            f"{of}_stable": stable_value,
-            f"{of}_unstable": unstable_value,
+            f"{of}_error": field_value_error,
+            f"{of}_stable": stable_field_value,
+            f"{of}_unstable": unstable_field_value,
             "critical_stiffness": step_family.scene.critical_stiffness,
-            **step_family.extra_output_values(step_size),
+            **step_family.compute_extra_output_values(step_size),
         }
 
     def _search_critical_step_upward(
-        self, step_family: StepFamily, integrator: Integrator
+        self, step_family: LoadingStepFamily, integrator: Integrator
     ) -> Outcome:
         """Find the critical step from motions after steps of increasing size.
 
@@ -381,25 +391,27 @@ class CriticalStep(Measure):
         unstable = smallest
         while unstable <= largest + 1e-9:
             try:
-                if motion_after_step.motion_reaches_norm(
-                    step_family.scene_with_step(math.exp(unstable)), integrator
+                if motion_after_step.motion_reaches_instability_norm(
+                    step_family.build_scene_with_step(math.exp(unstable)), integrator
                 ):
                     break
             except MotionStopped as halt:
                 if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
                     raise
-                return self._no_critical_step_outcome(
+                return self._build_outcome_without_critical_step(
                     step_family, math.exp(stable), integrator, f", because {halt}"
                 )
             stable, unstable = unstable, unstable + spacing
         else:
-            return self._no_critical_step_outcome(step_family, step_family.max_size, integrator)
+            return self._build_outcome_without_critical_step(
+                step_family, step_family.max_size, integrator
+            )
         if stable is None:
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STEP,
-                self._output_values(
+                self._build_output_values(
                     step_family,
-                    unstable_value=step_family.step_size_to_field_value(step_family.min_size),
+                    unstable_field_value=step_family.step_size_to_field_value(step_family.min_size),
                 ),
                 f"even a step to {step_family.step_size_to_field_value(step_family.min_size):.6g} "
                 "is unstable",
@@ -408,7 +420,7 @@ class CriticalStep(Measure):
 
     def _refine_size_bracket(
         self,
-        step_family: StepFamily,
+        step_family: LoadingStepFamily,
         log_size_bracket: tuple[float, float],
         integrator: Integrator,
     ) -> Outcome:
@@ -419,15 +431,17 @@ class CriticalStep(Measure):
         """
         stable, unstable = log_size_bracket
         tolerance = max(
-            step_family.size_tolerance(math.exp(unstable), integrator.result_tolerance()),
+            step_family.compute_step_size_tolerance(
+                math.exp(unstable), integrator.result_tolerance()
+            ),
             Accuracy.MIN_RTOL,
         )
         integrator = integrator.with_rtol(tolerance)
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
-            found = motion_after_step.compute_excess_over_instability_norm(
-                step_family.scene_with_step(math.exp(log_size)), integrator
+            found = motion_after_step.compute_log_rate_excess_over_norm(
+                step_family.build_scene_with_step(math.exp(log_size)), integrator
             )
             if found >= 0.0:
                 unstable = min(unstable, log_size)
@@ -441,7 +455,7 @@ class CriticalStep(Measure):
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
             if unstable - stable > _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
-                return self._no_critical_step_outcome(
+                return self._build_outcome_without_critical_step(
                     step_family, math.exp(log_size_bracket[0]), integrator, f", because {halt}"
                 )
             log_size = 0.5 * (stable + unstable)
@@ -449,14 +463,18 @@ class CriticalStep(Measure):
         # smaller tolerances.
         size = math.exp(log_size)
         error = max(
-            tolerance + step_family.size_error_if_neutrally_stable(size, tolerance),
+            tolerance + step_family.estimate_error_near_neutral_stability(size, tolerance),
             unstable - stable,
         )
         boundary = CriticalStepSizeEstimate(size, error, found_from_forward_motions=True)
-        return self._confirm_boundary_by_motions(step_family, boundary, integrator.refined())
+        return self._confirm_critical_size_by_motions(step_family, boundary, integrator.refined())
 
-    def _no_critical_step_outcome(
-        self, step_family: StepFamily, largest_size: float, integrator: Integrator, reason: str = ""
+    def _build_outcome_without_critical_step(
+        self,
+        step_family: LoadingStepFamily,
+        largest_size: float,
+        integrator: Integrator,
+        reason: str = "",
     ) -> Outcome:
         """Return the outcome if no step up to the largest size is critical.
 
@@ -466,19 +484,24 @@ class CriticalStep(Measure):
         """
         if (
             step_family.scene.has_mass
-            and _critical_size_without_inertia(step_family, integrator) is not None
+            and _compute_critical_size_without_inertia(step_family, integrator) is not None
         ):
             return Outcome(
                 Status.NORM_UNREACHABLE,
-                self._output_values(
-                    step_family, stable_value=step_family.step_size_to_field_value(largest_size)
+                self._build_output_values(
+                    step_family,
+                    stable_field_value=step_family.step_size_to_field_value(largest_size),
                 ),
                 "inertia keeps the slip rate below the instability norm "
                 f"{step_family.scene.instability_norm:g}",
             )
-        if step_family.largest_step_reaches_norm and not step_family.scene.has_mass and not reason:
+        if (
+            step_family.largest_step_immediately_reaches_norm
+            and not step_family.scene.has_mass
+            and not reason
+        ):
             value = step_family.step_size_to_field_value(largest_size)
-            values = self._output_values(
+            values = self._build_output_values(
                 step_family,
                 largest_size,
                 largest_size * Accuracy.RELATIVE_ROUNDING_ERROR,
@@ -490,8 +513,8 @@ class CriticalStep(Measure):
             )
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,
-            self._output_values(
-                step_family, stable_value=step_family.step_size_to_field_value(largest_size)
+            self._build_output_values(
+                step_family, stable_field_value=step_family.step_size_to_field_value(largest_size)
             ),
             f"stable for every step {'up' if self.direction == 'up' else 'down'} to "
             f"{step_family.step_size_to_field_value(largest_size):.6g}{reason}",
@@ -499,15 +522,15 @@ class CriticalStep(Measure):
 
 
 def _compute_excess_over_norm_after_step(
-    step_family: StepFamily, step_size: float, integrator: Integrator
+    step_family: LoadingStepFamily, step_size: float, integrator: Integrator
 ) -> float | None:
     """Compute the excess of ln V over the norm after a step of a given size.
 
     The result is None if the motion cannot continue.
     """
     try:
-        return motion_after_step.compute_excess_over_instability_norm(
-            step_family.scene_with_step(step_size), integrator
+        return motion_after_step.compute_log_rate_excess_over_norm(
+            step_family.build_scene_with_step(step_size), integrator
         )
     except MotionStopped as halt:
         if halt.status is Status.WORK_BUDGET_SPENT:
@@ -515,7 +538,9 @@ def _compute_excess_over_norm_after_step(
         return None
 
 
-def _critical_size_without_inertia(step_family: StepFamily, integrator: Integrator) -> float | None:
+def _compute_critical_size_without_inertia(
+    step_family: LoadingStepFamily, integrator: Integrator
+) -> float | None:
     """Compute the critical step for an instability norm with negligible inertia.
 
     The estimate requires few evaluations. The result is None if there is no critical path.
@@ -526,11 +551,11 @@ def _critical_size_without_inertia(step_family: StepFamily, integrator: Integrat
     )
     if massless.max_size <= massless.min_size or not massless.scene.critical_stiffness:
         return None
-    return next(massless.find_sizes_by_critical_path((1e-6,), integrator), None)
+    return next(massless.iterate_sizes_by_critical_path((1e-6,), integrator), None)
 
 
 def _bracket_critical_log_size(
-    step_family: StepFamily, size_guess: float, integrator: Integrator
+    step_family: LoadingStepFamily, size_guess: float, integrator: Integrator
 ) -> tuple[float, float] | None:
     """Find a stable and an unstable step size around a guess.
 
@@ -539,15 +564,15 @@ def _bracket_critical_log_size(
     finds no bracket.
     """
     middle = math.log(size_guess)
-    reached = motion_after_step.motion_reaches_norm(
-        step_family.scene_with_step(size_guess), integrator
+    reached = motion_after_step.motion_reaches_instability_norm(
+        step_family.build_scene_with_step(size_guess), integrator
     )
     inner, reach = middle, 1e-4
     while reach < 1.5:
         outer = middle - reach if reached else min(middle + reach, math.log(step_family.max_size))
         if (
-            motion_after_step.motion_reaches_norm(
-                step_family.scene_with_step(math.exp(outer)), integrator
+            motion_after_step.motion_reaches_instability_norm(
+                step_family.build_scene_with_step(math.exp(outer)), integrator
             )
             != reached
         ):

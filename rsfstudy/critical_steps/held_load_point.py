@@ -35,15 +35,15 @@ from rsfstudy.status import Status
 #: ln V and the instability norm.
 _MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING = 1.0, 0.12
 #: Decreases in ln V at which the weakening of friction by the states is tested.
-_TESTED_LOG_RATE_DECREASES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+_LOG_RATE_DECREASES_TESTED_FOR_WEAKENING = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 #: Increases in ln V that are tested as upper bounds of the effect of pore pressure.
-_TESTED_LOG_RATE_INCREASES = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
+_TRIAL_LOG_RATE_INCREASES_BY_PRESSURE = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
 #: Maximum ratio of the weakening of friction by the states to the decrease in spring stress. No
 #: further peak of ln V is possible below this ratio.
 _MAX_WEAKENING_OVER_SPRING_UNLOADING = 0.5
 
 
-def compute_peak_excess_over_instability_norm(scene: Scene, integrator: Integrator) -> float:
+def compute_peak_log_rate_excess_over_norm(scene: Scene, integrator: Integrator) -> float:
     """Compute the height of the highest ln V peak above the instability norm.
 
     The peak is the highest value of ln V in the motion. If the effect of inertia is small, the
@@ -106,7 +106,7 @@ def _build_event_specs_for_held_load_point(
     if scene.state_count > 1:
         specs.append(fall("spring_stress", -scene.mu_star))
         below = _MIN_LEVEL_SPACING
-        while log_slip_rate_at_norm - below > Scene.STOPPED_LOG_SLIP_RATE:
+        while log_slip_rate_at_norm - below > Scene.LOG_SLIP_RATE_OF_STOPPED_SLIP:
             specs.append(fall("log_slip_rate", log_slip_rate_at_norm - below))
             below += max(_MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING * below)
     return specs
@@ -119,10 +119,12 @@ def _no_later_peak_reaches_norm(scene: Scene, event: Event) -> bool:
         return slows or event.kind is EventKind.MAXIMUM
     if event.regime == Scene.RUPTURE_REGIME or not (slows or event.kind is EventKind.FALL):
         return False
-    return scene.mu_star + event.point.spring_stress <= 0.0 or _stays_below_norm(scene, event.point)
+    return scene.mu_star + event.point.spring_stress <= 0.0 or _slip_rate_stays_below_norm(
+        scene, event.point
+    )
 
 
-def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
+def _slip_rate_stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     """Return True if ln V provably stays below the instability norm.
 
     The slip rate must be decreasing at the tested point of the motion. A state that strengthens
@@ -139,11 +141,11 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     strengthening = evolve(point.log_slip_rate, point.psis, shift)
     if min(strengthening[i] for i in states) < 0.0:
         return False
-    raised, least_shift = _bound_pore_pressure_effect(scene, point)
+    raised, least_shift = _bound_log_rate_rise_by_pore_pressure(scene, point)
     if point.log_slip_rate + raised >= scene.log_instability_rate:
         return False
     fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_OVER_SPRING_UNLOADING)
-    for distance in _TESTED_LOG_RATE_DECREASES:
+    for distance in _LOG_RATE_DECREASES_TESTED_FOR_WEAKENING:
         x = point.log_slip_rate - distance
         rest = scene.compute_steady_states(x, shift)
         later = scene.compute_steady_states(
@@ -155,7 +157,7 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     return True
 
 
-def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float, float]:
+def _bound_log_rate_rise_by_pore_pressure(scene: Scene, point: MotionPoint) -> tuple[float, float]:
     """Compute an upper bound on the increase in ln V due to pore pressure and heat.
 
     The function returns the upper bound, and the smallest decrease in the state due to stress and
@@ -166,8 +168,10 @@ def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float
     value, _slope, shift, _ = scene.friction_relation(point.psis)(point.frictional_stress)
     if not scene.parts.fluid.unknowns and not scene.parts.temperature.unknowns:
         return 0.0, shift
-    for bound in _TESTED_LOG_RATE_INCREASES:
-        hottest, coldest = _bound_unknowns(scene, point, point.log_slip_rate + bound)
+    for bound in _TRIAL_LOG_RATE_INCREASES_BY_PRESSURE:
+        hottest, coldest = _find_extreme_pressure_and_heat_states(
+            scene, point, point.log_slip_rate + bound
+        )
         if math.isinf(max(map(abs, (*hottest, *coldest)))):
             break
         weaker = scene.friction_relation(hottest)(point.frictional_stress)[0]
@@ -177,7 +181,7 @@ def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float
     return math.inf, shift
 
 
-def _bound_unknowns(
+def _find_extreme_pressure_and_heat_states(
     scene: Scene, point: MotionPoint, log_slip_rate: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the states at the highest pore pressure and extreme temperatures.

@@ -39,7 +39,7 @@ def check_loading_is_single_step(scene: Scene) -> None:
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)
 
 
-def outcome_if_norm_is_below_load_velocity(scene: Scene, load_velocity: float = 0.0) -> Outcome:
+def build_norm_below_load_velocity_outcome(scene: Scene, load_velocity: float = 0.0) -> Outcome:
     """Return the outcome if the load point velocity exceeds the instability norm.
 
     Steady sliding before the step, or the load point after the step, may already be faster than the

@@ -141,7 +141,7 @@ def _build_log_rate_and_state_lag_derivatives(
     )
 
     def at(x: float, lag: float) -> tuple[float, float]:
-        friction = scene.frictional_stress_for_friction(
+        friction = scene.frictional_stress_from_friction(
             scene.steady_friction_minus_reference(x) + lag
         )
         if friction is None:

@@ -10,16 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.held_load_point import compute_peak_excess_over_instability_norm
+from rsfstudy.critical_steps.held_load_point import compute_peak_log_rate_excess_over_norm
 from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
     build_events_testing_monotone_rise,
     rises_monotonically_to_load_rate,
 )
 from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
 from rsfstudy.critical_steps.stability_after_step import (
-    SteadySlidingWithMargin,
+    SteadySlidingWithStabilityMargin,
+    compute_steady_sliding_with_margin,
     may_have_closed_orbits,
-    steady_sliding_with_margin,
 )
 from rsfstudy.motion import (
     EventKind,
@@ -32,7 +32,7 @@ from rsfstudy.motion import (
 from rsfstudy.slider import MotionPoint, Scene
 
 #: Largest amplitude of ln V for which linear theory predicts the growth of oscillations.
-_MAX_LINEAR_LOG_RATE_AMPLITUDE = 0.05
+_MAX_LOG_RATE_AMPLITUDE_OF_LINEAR_THEORY = 0.05
 #: Ratio of the size of the next orbit to the size of the present orbit if oscillations grow slowly,
 #: and smallest permitted ratio. The orbits between the two sizes are not computed, so limit cycles
 #: between the two sizes may be missed. The ratio is reduced if the next orbit would exceed the
@@ -68,12 +68,12 @@ class _OrbitOutcome:
     """
 
     log_slip_rate_peaks: tuple[float, ...]
-    reached_norm: bool
+    reached_instability_norm: bool
     point_where_growth_was_too_slow: MotionPoint | None = None
     initial_log_slip_rate: float = -math.inf
 
 
-def motion_reaches_norm(scene: Scene, integrator: Integrator) -> bool:
+def motion_reaches_instability_norm(scene: Scene, integrator: Integrator) -> bool:
     """Return True if the slip rate reaches the instability norm after the step.
 
     Parameters
@@ -88,10 +88,10 @@ def motion_reaches_norm(scene: Scene, integrator: Integrator) -> bool:
     bool
         True if ``compute_excess_over_instability_norm`` is not negative.
     """
-    return compute_excess_over_instability_norm(scene, integrator) >= 0.0
+    return compute_log_rate_excess_over_norm(scene, integrator) >= 0.0
 
 
-def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -> float:
+def compute_log_rate_excess_over_norm(scene: Scene, integrator: Integrator) -> float:
     """Compute the excess of ln V over the instability norm after the step.
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
@@ -132,18 +132,18 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
     repeats. The module ``held_load_point`` handles held load points.
     """
     if scene.log_load_velocity == -math.inf:
-        return compute_peak_excess_over_instability_norm(scene, integrator)
-    steady = steady_sliding_with_margin(scene)
+        return compute_peak_log_rate_excess_over_norm(scene, integrator)
+    steady = compute_steady_sliding_with_margin(scene)
     norm, heavy = scene.log_instability_rate, inertia_matters_below_norm(scene, integrator)
     if (
         may_have_closed_orbits(scene)
         and abs(steady.stability_margin) < integrator.result_tolerance()
     ):
-        top = _max_log_slip_rate_of_closed_orbit(scene, integrator)
+        top = _compute_max_log_rate_of_closed_orbit(scene, integrator)
         if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return top - norm
     first = _follow_one_orbit(scene, steady, None, integrator, with_inertia=heavy)
-    reached = first.reached_norm
+    reached = first.reached_instability_norm
     if first.point_where_growth_was_too_slow is not None:
         at = first.point_where_growth_was_too_slow
         reached = _slow_orbit_grows_to_norm(scene, steady, at, integrator, with_inertia=heavy)
@@ -151,7 +151,7 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
     return max(excess, 1e-12) if reached else min(excess, -1e-12)
 
 
-def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> float:
+def _compute_max_log_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> float:
     """Compute the largest value of ln V on a closed orbit.
 
     The largest ln V on the orbit is the last maximum before the start of the motion, or the first
@@ -165,7 +165,7 @@ def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> 
         (begin.spring_stress, begin.psi),
     )
     rising, norm = (
-        equations.evaluate_point(start).log_slip_rate_derivative > 0.0,
+        equations.evaluate_motion_point(start).log_slip_rate_derivative > 0.0,
         scene.log_instability_rate,
     )
     specs = (_SLIP_RATE_PEAK_EVENT, minimum("log_slip_rate"), rise("log_slip_rate", norm))
@@ -193,7 +193,7 @@ def _orbit_touching_norm_shrinks(scene: Scene, integrator: Integrator) -> bool:
 
 def _slow_orbit_grows_to_norm(
     scene: Scene,
-    steady_state: SteadySlidingWithMargin,
+    steady_state: SteadySlidingWithStabilityMargin,
     start_point: MotionPoint,
     integrator: Integrator,
     *,
@@ -221,17 +221,21 @@ def _slow_orbit_grows_to_norm(
         orbit = _follow_one_orbit(
             scene, steady_state, beyond, integrator, with_inertia=with_inertia
         )
-        if orbit.reached_norm and len(orbit.log_slip_rate_peaks) == 1 and leap > _MIN_LEAP_FACTOR:
+        if (
+            orbit.reached_instability_norm
+            and len(orbit.log_slip_rate_peaks) == 1
+            and leap > _MIN_LEAP_FACTOR
+        ):
             leap = math.sqrt(leap)
         elif orbit.point_where_growth_was_too_slow is None:
-            return orbit.reached_norm
+            return orbit.reached_instability_norm
         else:
             start_point = orbit.point_where_growth_was_too_slow
 
 
 def _follow_one_orbit(
     scene: Scene,
-    steady_state: SteadySlidingWithMargin,
+    steady_state: SteadySlidingWithStabilityMargin,
     start_point: MotionPoint | None,
     integrator: Integrator,
     *,
@@ -260,30 +264,34 @@ def _follow_one_orbit(
                 # The start is not a peak of an orbit, so later peaks are not compared with it.
                 at_start = top
                 if top >= norm:
-                    return _OrbitOutcome((), reached_norm=True, initial_log_slip_rate=top)
+                    return _OrbitOutcome(
+                        (), reached_instability_norm=True, initial_log_slip_rate=top
+                    )
             elif top >= norm and not with_inertia:
-                return _OrbitOutcome((top,), reached_norm=True)
+                return _OrbitOutcome((top,), reached_instability_norm=True)
         elif event.specification in levels:
             if rises_monotonically_to_load_rate(scene, event.point):
                 return _OrbitOutcome(
-                    tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start
+                    tuple(peaks), reached_instability_norm=False, initial_log_slip_rate=at_start
                 )
         elif event.kind is EventKind.RISE:
             return _OrbitOutcome(
-                (*peaks, norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM), reached_norm=True
+                (*peaks, norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM), reached_instability_norm=True
             )
         elif event.kind is EventKind.SETTLED and steady_state.is_stable:
-            return _OrbitOutcome(tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start)
+            return _OrbitOutcome(
+                tuple(peaks), reached_instability_norm=False, initial_log_slip_rate=at_start
+            )
         elif event.kind is EventKind.MAXIMUM:
             peaks.append(top)
             if top >= norm:
-                return _OrbitOutcome(tuple(peaks), reached_norm=True)
+                return _OrbitOutcome(tuple(peaks), reached_instability_norm=True)
             if not planar:
                 if repeating.is_repeating_at_peak(event.point):
-                    return _OrbitOutcome(tuple(peaks), reached_norm=False)
+                    return _OrbitOutcome(tuple(peaks), reached_instability_norm=False)
                 continue
             if len(peaks) > 1 and _peaks_have_stopped_growing(peaks, steady_state, integrator):
-                return _OrbitOutcome(tuple(peaks), reached_norm=False)
+                return _OrbitOutcome(tuple(peaks), reached_instability_norm=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
             if slow and not steady_state.is_stable and event.regime != Scene.RUPTURE_REGIME:
                 return _OrbitOutcome(tuple(peaks), False, event.point)
@@ -300,7 +308,7 @@ class _CycleRepetitionDetector:
     """
 
     def __init__(
-        self, scene: Scene, steady_state: SteadySlidingWithMargin, integrator: Integrator
+        self, scene: Scene, steady_state: SteadySlidingWithStabilityMargin, integrator: Integrator
     ) -> None:
         self._steady, self._tolerance = steady_state, 30.0 * integrator.local_tolerance * scene.a
         self._previous, self._repeat_count = (math.inf,) * (1 + scene.state_count), 0
@@ -321,7 +329,8 @@ class _CycleRepetitionDetector:
         current = (peak_point.spring_stress, *peak_point.psis)
         change = max(abs(x - y) for x, y in zip(current, self._previous, strict=True))
         linear = (
-            peak_point.log_slip_rate - self._steady.log_slip_rate < _MAX_LINEAR_LOG_RATE_AMPLITUDE
+            peak_point.log_slip_rate - self._steady.log_slip_rate
+            < _MAX_LOG_RATE_AMPLITUDE_OF_LINEAR_THEORY
             and not self._steady.is_stable
         )
         self._repeat_count = (
@@ -332,7 +341,7 @@ class _CycleRepetitionDetector:
 
 
 def _peaks_have_stopped_growing(
-    peaks: Sequence[float], steady_state: SteadySlidingWithMargin, integrator: Integrator
+    peaks: Sequence[float], steady_state: SteadySlidingWithStabilityMargin, integrator: Integrator
 ) -> bool:
     """Return True if the last peak is not higher than the previous peak.
 
@@ -340,7 +349,7 @@ def _peaks_have_stopped_growing(
     """
     slack = 100.0 * integrator.local_tolerance
     linear = (
-        peaks[-1] - steady_state.log_slip_rate < _MAX_LINEAR_LOG_RATE_AMPLITUDE
+        peaks[-1] - steady_state.log_slip_rate < _MAX_LOG_RATE_AMPLITUDE_OF_LINEAR_THEORY
         and not steady_state.is_stable
     )
     return peaks[-1] - peaks[-2] <= (-slack if linear else slack)

@@ -32,7 +32,7 @@ MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL = 0.01
 #: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
 _COUNT_OF_STEP_SIZES_TESTED_FOR_STABILITY = 24
 #: Local tolerance of the integrations for the approximate root of the misfit.
-LOCAL_TOLERANCE_OF_FIRST_ROOT = 1e-5
+LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT = 1e-5
 #: Smallest and largest difference of ln(step size) over which the slope of the misfit is computed.
 #: If a correction of the approximate root exceeds the largest difference of ln(step size), the
 #: refinement of the root ends.
@@ -45,7 +45,7 @@ _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
 _MAX_SEARCH_STRIDES_WITHOUT_CRITICAL_PATH = 3
 
 
-class StepFamily:
+class LoadingStepFamily:
     """Base class of step families. A family contains steps of one type and direction.
 
     The step size is a positive number that increases with the magnitude of the step.
@@ -67,13 +67,13 @@ class StepFamily:
     """
 
     #: Name of the scene field that contains the step.
-    stepped_field: ClassVar[str]
+    stepped_field_name: ClassVar[str]
     #: Name of the critical step in the results.
     critical_output_name: ClassVar[str]
     #: Names of additional results for the critical step.
     extra_output_names: ClassVar[tuple[str, ...]] = ()
     #: True if the largest step immediately raises the slip rate to the instability norm.
-    largest_step_reaches_norm = False
+    largest_step_immediately_reaches_norm = False
 
     def __init__(self, scene: Scene, sign: int) -> None:
         self.scene, self.sign = scene, sign
@@ -81,7 +81,7 @@ class StepFamily:
         self.max_size = self._compute_max_size() * (1.0 - 1e-9)
         self.min_size = min(MIN_STEP_SIZE, _MIN_SIZE_FRACTION * self.max_size)
 
-    def scene_with_step(self, step_size: float) -> Scene:
+    def build_scene_with_step(self, step_size: float) -> Scene:
         """Return the scene with a step of a given size.
 
         Parameters
@@ -97,7 +97,7 @@ class StepFamily:
         scene = self._scenes_by_step_size.get(step_size)
         if scene is None:
             value = self.step_size_to_field_value(step_size)
-            scene = self.scene.with_(**{self.stepped_field: value})
+            scene = self.scene.with_(**{self.stepped_field_name: value})
             self._scenes_by_step_size[step_size] = scene
         return scene
 
@@ -116,7 +116,7 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} does not define this method")
 
-    def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
+    def compute_field_value_error(self, step_size: float, step_size_relative_error: float) -> float:
         """Return the error in the step value caused by an error in the step size.
 
         Parameters
@@ -133,7 +133,7 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} does not define this method")
 
-    def size_tolerance(self, step_size: float, value_tolerance: float) -> float:
+    def compute_step_size_tolerance(self, step_size: float, field_value_tolerance: float) -> float:
         r"""Convert a tolerance of the step value to a tolerance of the step size.
 
         A relative error of the step size that equals the returned tolerance causes a relative error
@@ -161,9 +161,9 @@ class StepFamily:
         """
         change = abs(self.step_size_to_field_value(step_size) - self.step_size_to_field_value(0.0))
         error = self.compute_field_value_error(step_size, 1.0)
-        return min(value_tolerance, value_tolerance * change / error)
+        return min(field_value_tolerance, field_value_tolerance * change / error)
 
-    def extra_output_values(self, step_size: float) -> dict[str, float]:
+    def compute_extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the additional results for a critical step.
 
         Parameters
@@ -178,7 +178,7 @@ class StepFamily:
         """
         return {}
 
-    def find_sizes_by_critical_path(
+    def iterate_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield estimates of the step size at which the critical path starts.
@@ -197,7 +197,7 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} does not define this method")
 
-    def find_sizes_by_limit_cycle(
+    def iterate_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield step sizes at which a limit cycle touches the instability norm.
@@ -237,7 +237,7 @@ class StepFamily:
         """
         return False
 
-    def size_error_if_neutrally_stable(self, step_size: float, tolerance: float) -> float:
+    def estimate_error_near_neutral_stability(self, step_size: float, tolerance: float) -> float:
         """Return the error of the step size close to neutral stability.
 
         Close to neutral stability, motions that are integrated forwards in time do not reveal
@@ -280,13 +280,13 @@ class StepFamily:
             sizes = np.geomspace(
                 self.min_size, step_size, _COUNT_OF_STEP_SIZES_TESTED_FOR_STABILITY
             ).tolist()
-        return all(is_linearly_stable(self.scene_with_step(each)) for each in sizes)
+        return all(is_linearly_stable(self.build_scene_with_step(each)) for each in sizes)
 
     def _compute_max_size(self) -> float:
         raise TypeError(f"{type(self).__name__} does not define this method")
 
 
-def slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
+def compute_slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
     r"""Compute the delay of a slider with inertia after a step.
 
     Parameters
@@ -306,7 +306,7 @@ def slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
     return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate
 
 
-class ShootingStepFamily(StepFamily):
+class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
     """Base class of steps whose critical path depends on the step size.
 
     The critical path depends on the step size if the step changes friction or the load point
@@ -328,14 +328,14 @@ class ShootingStepFamily(StepFamily):
 
     sign_of_triggering_steps: ClassVar[int]
 
-    def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
+    def compute_field_value_error(self, step_size: float, step_size_relative_error: float) -> float:
         """Return the error of a step value that is the exponential of the step size.
 
         See ``StepFamily.compute_field_value_error``.
         """
-        return math.exp(self.sign * step_size) * step_size * relative_error
+        return math.exp(self.sign * step_size) * step_size * step_size_relative_error
 
-    def find_sizes_by_critical_path(
+    def iterate_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield estimates of the step size at which the critical path starts.
@@ -374,9 +374,9 @@ class ShootingStepFamily(StepFamily):
         callable
             Function ``size -> CriticalPath``.
         """
-        return lambda size: CriticalPath.from_scene(self.scene_with_step(size), integrator)
+        return lambda size: CriticalPath.from_scene(self.build_scene_with_step(size), integrator)
 
-    def find_sizes_by_limit_cycle(
+    def iterate_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield step sizes at which a limit cycle touches the instability norm.
@@ -388,7 +388,9 @@ class ShootingStepFamily(StepFamily):
         found, path_at = dict[float, float](), self.build_critical_path_factory(integrator)
 
         @cache
-        def misfit(log_size: float, tolerance: float = LOCAL_TOLERANCE_OF_FIRST_ROOT) -> float:
+        def misfit(
+            log_size: float, tolerance: float = LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT
+        ) -> float:
             higher = path_at(math.exp(log_size)).compute_next_peak_height_above_norm(tolerance)
             if higher is None:
                 return math.nan
@@ -417,11 +419,11 @@ class ShootingStepFamily(StepFamily):
         def misfit(log_size: float) -> float:
             size = math.exp(log_size)
             state = build_critical_path(size).compute_state_misfit_at_path_start(
-                LOCAL_TOLERANCE_OF_FIRST_ROOT
+                LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT
             )
             if state is None:
                 return self._find_misfit_sign_without_critical_path(
-                    self.scene_with_step(size), integrator
+                    self.build_scene_with_step(size), integrator
                 )
             found[log_size] = state
             return state
@@ -466,10 +468,10 @@ class ShootingStepFamily(StepFamily):
                 stride = min(1.5 * stride, _MAX_STRIDE)
             return None
 
-        way = self._search_direction(misfit_function(log_size(guess)))
+        way = self._choose_search_direction(misfit_function(log_size(guess)))
         return outwards(way) or outwards(-way) if way else outwards(1, -1)
 
-    def _search_direction(self, misfit_at_guess: float) -> int:
+    def _choose_search_direction(self, misfit_at_guess: float) -> int:
         """Return the direction in which the critical step size is expected.
 
         The result is 1 for larger sizes, -1 for smaller sizes, and 0 if the misfit does not

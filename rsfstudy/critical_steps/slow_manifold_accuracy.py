@@ -22,10 +22,12 @@ def inertia_matters_below_norm(scene: Scene, integrator: Integrator) -> bool:
         True if the scene has inertia, and if the relative error of a boundary that is computed on
         the slow manifold exceeds a tenth of the requested accuracy.
     """
-    return scene.has_mass and slow_manifold_relative_error(scene) > integrator.result_tolerance(0.1)
+    return scene.has_mass and estimate_slow_manifold_relative_error(
+        scene
+    ) > integrator.result_tolerance(0.1)
 
 
-def slow_manifold_relative_error(scene: Scene) -> float:
+def estimate_slow_manifold_relative_error(scene: Scene) -> float:
     r"""Estimate the relative error of a critical step due to the slow manifold.
 
     Parameters

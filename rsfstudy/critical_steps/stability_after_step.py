@@ -17,7 +17,7 @@ _NEUTRAL_STABILITY_MARGIN = 1e-9
 
 
 @dataclass(frozen=True)
-class SteadySlidingWithMargin(SteadySliding):
+class SteadySlidingWithStabilityMargin(SteadySliding):
     """Steady sliding at the load point velocity, and its stability margin.
 
     At constant normal stress and critical stiffness, steady sliding is neutrally stable and every
@@ -43,7 +43,7 @@ class SteadySlidingWithMargin(SteadySliding):
         scene, law = self.scene, self.scene.parts.law
         at_every_rate = may_have_closed_orbits(scene) and law.scale_free and not law.regularised
         if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
-            margin = stiffness_ratio_after_step(scene) - 1.0
+            margin = compute_stiffness_ratio_after_step(scene) - 1.0
         else:
             critical = scene.critical_stiffness_at(self.log_slip_rate)
             margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
@@ -103,7 +103,7 @@ def may_have_closed_orbits(scene: Scene) -> bool:
     )
 
 
-def stiffness_ratio_after_step(scene: Scene) -> float:
+def compute_stiffness_ratio_after_step(scene: Scene) -> float:
     """Return the stiffness ratio k/k_cr after a step.
 
     If friction is the only source of damping, the critical stiffness at V_* is proportional to
@@ -144,10 +144,10 @@ def is_neutrally_stable(scene: Scene, tolerance: float) -> bool:
         held. The result is also False if the stiffness is exactly critical and all orbits are
         closed. In both cases, the stability of steady sliding is known without integration.
     """
-    off = abs(stiffness_ratio_after_step(scene) - 1.0)
+    off = abs(compute_stiffness_ratio_after_step(scene) - 1.0)
     known = scene.log_load_velocity == -math.inf or (off == 0.0 and may_have_closed_orbits(scene))
     close = has_frictional_damping_only(scene) and off < tolerance and not known
-    return close and abs(stability_margin(scene)) < tolerance
+    return close and abs(compute_stability_margin(scene)) < tolerance
 
 
 def is_linearly_stable(scene: Scene) -> bool:
@@ -163,10 +163,10 @@ def is_linearly_stable(scene: Scene) -> bool:
     bool
         True if small perturbations do not grow, or if the load point is held.
     """
-    return stability_margin(scene) >= -_NEUTRAL_STABILITY_MARGIN
+    return compute_stability_margin(scene) >= -_NEUTRAL_STABILITY_MARGIN
 
 
-def stability_margin(scene: Scene) -> float:
+def compute_stability_margin(scene: Scene) -> float:
     """Compute the stability margin of steady sliding.
 
     The margin is the relative excess of the stiffness over the critical stiffness at the load point
@@ -193,11 +193,11 @@ def stability_margin(scene: Scene) -> float:
     return (
         math.inf
         if scene.log_load_velocity == -math.inf
-        else steady_sliding_with_margin(scene).stability_margin
+        else compute_steady_sliding_with_margin(scene).stability_margin
     )
 
 
-def steady_sliding_with_margin(scene: Scene) -> SteadySlidingWithMargin:
+def compute_steady_sliding_with_margin(scene: Scene) -> SteadySlidingWithStabilityMargin:
     """Compute steady sliding at the load point velocity of the scene.
 
     Parameters
@@ -222,7 +222,7 @@ def steady_sliding_with_margin(scene: Scene) -> SteadySlidingWithMargin:
             Status.NO_STEADY_STATE,
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
-    return SteadySlidingWithMargin(**vars(sliding), scene=scene)
+    return SteadySlidingWithStabilityMargin(**vars(sliding), scene=scene)
 
 
 def _is_stable_to_small_perturbations(scene: Scene) -> bool:

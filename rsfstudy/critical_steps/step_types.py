@@ -11,46 +11,46 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.critical_steps.shooting_steps import (
-    LOCAL_TOLERANCE_OF_FIRST_ROOT,
+    LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT,
     LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA,
     MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL,
     MIN_STEP_SIZE,
-    ShootingStepFamily,
-    StepFamily,
-    slip_lag_due_to_inertia,
+    LoadingStepFamily,
+    LoadingStepFamilySolvedByShooting,
+    compute_slip_lag_due_to_inertia,
 )
 from rsfstudy.critical_steps.stability_after_step import (
+    compute_stability_margin,
     is_linearly_stable,
     may_have_closed_orbits,
-    stability_margin,
 )
 from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.slider import (
     Scene,
-    effective_friction,
+    compute_effective_friction,
 )
 from rsfstudy.status import Status
 
 #: Smallest load point velocity of the search, in units of V_*.
-MIN_LOAD_VELOCITY = 1e-20
+MIN_SEARCHED_LOAD_VELOCITY = 1e-20
 #: Minimum value of b/a - 1 in the formula for the first guess of the critical step size. The
 #: minimum of b/a - 1 is necessary because some laws weaken friction although b < a.
 _MIN_B_OVER_A_MINUS_ONE_IN_SIZE_GUESS = 1e-6
 #: Largest spring stress after a step, in units of sigma_*.
-_MAX_SPRING_STRESS = 1e6
+_MAX_SPRING_STRESS_AFTER_STEP = 1e6
 _LOG_OF_MAX_FLOAT = math.log(sys.float_info.max)
 #: Largest |ln(sigma/sigma_*)| after a step.
 _MAX_LOG_NORMAL_STRESS_RATIO = math.log(1e3)
 #: Relative accuracy to which the largest step size is computed.
-_RTOL_OF_MAX_STEP_SIZE = 1e-6
+_RTOL_FOR_FINDING_MAX_STEP_SIZE = 1e-6
 #: Minimum effective friction in the formula for the first guess of the critical step size, as a
 #: fraction of mu_*. The effect of normal stress on the state may cancel friction completely.
 _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR = 0.1
 
 
-class LoadVelocityStepFamily(ShootingStepFamily):
+class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
     """Family of load point velocity steps with the size ``|ln(V_0/V_*)|``.
 
     Parameters
@@ -61,7 +61,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
-    stepped_field = "load_velocity_ratio"
+    stepped_field_name = "load_velocity_ratio"
     critical_output_name = "critical_velocity_ratio"
     sign_of_triggering_steps = 1
 
@@ -100,7 +100,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
         """
         if self.sign != self.sign_of_triggering_steps:
             return math.nan
-        return -1.0 if _reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
+        return -1.0 if _motion_reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
 
     def _compute_max_size(self) -> float:
         """Return the largest step size of the search.
@@ -113,11 +113,13 @@ class LoadVelocityStepFamily(ShootingStepFamily):
             return self.scene.log_instability_rate
         scene, slowest = self.scene, self.scene.min_steady_log_slip_rate()
         return (
-            min(-math.log(MIN_LOAD_VELOCITY), -slowest) if scene.log_instability_rate > 0.0 else 0.0
+            min(-math.log(MIN_SEARCHED_LOAD_VELOCITY), -slowest)
+            if scene.log_instability_rate > 0.0
+            else 0.0
         )
 
 
-class DisplacementStepFamily(StepFamily):
+class DisplacementStepFamily(LoadingStepFamily):
     """Family of displacement steps with the size ``|d|`` in units of D_c.
 
     The load point is held after the step, unless the scene specifies a load point velocity.
@@ -130,7 +132,7 @@ class DisplacementStepFamily(StepFamily):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
-    stepped_field = "displacement_step"
+    stepped_field_name = "displacement_step"
     critical_output_name = "critical_displacement"
     extra_output_names = ("slip_rate_after_step", "slip_rate_after_closed_form_step")
 
@@ -146,12 +148,12 @@ class DisplacementStepFamily(StepFamily):
         """
         return self.sign * step_size
 
-    def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
+    def compute_field_value_error(self, step_size: float, step_size_relative_error: float) -> float:
         """Return the error of the displacement, in units of D_c.
 
         See ``StepFamily.compute_field_value_error``.
         """
-        return step_size * relative_error
+        return step_size * step_size_relative_error
 
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical step size significantly.
@@ -164,7 +166,7 @@ class DisplacementStepFamily(StepFamily):
         scene = self.scene
         if not scene.has_mass:
             return False
-        behind, rate = slip_lag_due_to_inertia(self.scene_with_step(step_size))
+        behind, rate = compute_slip_lag_due_to_inertia(self.build_scene_with_step(step_size))
         missed = 0.5 * scene.a * scene.parts.law.state_change_over_a / scene.stiffness
         loaded = scene.load_velocity / rate if rate else 0.0
         return (
@@ -180,7 +182,7 @@ class DisplacementStepFamily(StepFamily):
         """
         return is_linearly_stable(self.scene)
 
-    def extra_output_values(self, step_size: float) -> dict[str, float]:
+    def compute_extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the slip rates immediately after two steps, in units of V_*.
 
         The first step is the critical step. The second step has the displacement D_c a/(b - a),
@@ -200,7 +202,7 @@ class DisplacementStepFamily(StepFamily):
         )
         return dict(zip(self.extra_output_names, (critical, closed_form), strict=True))
 
-    def find_sizes_by_critical_path(
+    def iterate_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield the size of the step at which the critical path starts.
@@ -212,7 +214,7 @@ class DisplacementStepFamily(StepFamily):
         """
         path, sign = CriticalPath.from_scene(self.scene, integrator), self.sign
         for tolerance in local_tolerances:
-            start = path.find_start_point(
+            start = path.find_path_start_by_backward_integration(
                 tolerance, ("psi", 0.0), lambda point: sign * point.spring_stress > 0.0
             )
             if start is None:
@@ -238,14 +240,14 @@ class DisplacementStepFamily(StepFamily):
             scene.a * (scene.log_instability_rate + farther)
         )
         if friction is None:
-            return _MAX_SPRING_STRESS / scene.stiffness
+            return _MAX_SPRING_STRESS_AFTER_STEP / scene.stiffness
         self.largest_step_reaches_norm = True
         return (
             friction + scene.dynamics.radiated_stress(scene.log_instability_rate)
         ) / scene.stiffness
 
 
-class NormalStressStepFamily(ShootingStepFamily):
+class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
     """Family of normal stress steps with the size ``|ln(1 + step/sigma_*)|``.
 
     The load point is held after the step, unless the scene specifies a load point velocity. The
@@ -260,7 +262,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
-    stepped_field = "normal_stress_step"
+    stepped_field_name = "normal_stress_step"
     critical_output_name = "critical_normal_stress_step"
     sign_of_triggering_steps = -1
     extra_output_names = ("slip_rate_after_step",)
@@ -290,7 +292,9 @@ class NormalStressStepFamily(ShootingStepFamily):
         """
         scene = self.scene
         behind = (
-            slip_lag_due_to_inertia(self.scene_with_step(step_size))[0] if scene.has_mass else 0.0
+            compute_slip_lag_due_to_inertia(self.build_scene_with_step(step_size))[0]
+            if scene.has_mass
+            else 0.0
         )
         missed = max(1.0, 0.5 * scene.parts.law.state_change_over_a) * behind
         return (
@@ -302,18 +306,21 @@ class NormalStressStepFamily(ShootingStepFamily):
             / scene.a
         )
 
-    def size_error_if_neutrally_stable(self, step_size: float, tolerance: float) -> float:
+    def estimate_error_near_neutral_stability(self, step_size: float, tolerance: float) -> float:
         """Return the error of the step size close to neutral stability.
 
         The error follows from two facts: the critical stiffness is proportional to normal stress,
         and the step size is the logarithm of normal stress. See
         ``StepFamily.size_error_if_neutrally_stable``.
         """
-        scene = self.scene_with_step(step_size)
-        near = may_have_closed_orbits(scene) and abs(stability_margin(scene)) < 10.0 * tolerance
+        scene = self.build_scene_with_step(step_size)
+        near = (
+            may_have_closed_orbits(scene)
+            and abs(compute_stability_margin(scene)) < 10.0 * tolerance
+        )
         return 2.0 * tolerance / step_size if near else 0.0
 
-    def extra_output_values(self, step_size: float) -> dict[str, float]:
+    def compute_extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the slip rate immediately after the critical step.
 
         The slip rate is in units of V_*. See ``StepFamily.extra_output_values``.
@@ -321,7 +328,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         rate = (
             math.nan
             if math.isnan(step_size)
-            else math.exp(self._log_slip_rate_after_step(step_size))
+            else math.exp(self._compute_log_slip_rate_after_step(step_size))
         )
         return dict(zip(self.extra_output_names, (rate,), strict=True))
 
@@ -336,7 +343,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         if self.sign > 0 and 1.0 < scene.stiffness_ratio < math.inf:
             return math.log(scene.stiffness_ratio)
         _follows, alpha = scene.parts.normal_stress.coupling or (0.0, 0.0)
-        friction = effective_friction(scene.mu_star, max(law.b_over_a, 1.0), alpha)
+        friction = compute_effective_friction(scene.mu_star, max(law.b_over_a, 1.0), alpha)
         friction = max(abs(friction), _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR * scene.mu_star)
         return scene.a * scene.stiffness_ratio / friction
 
@@ -350,7 +357,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         if self.sign != self.sign_of_triggering_steps:
             return math.nan
         try:
-            return -1.0 if _reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
+            return -1.0 if _motion_reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
@@ -373,25 +380,25 @@ class NormalStressStepFamily(ShootingStepFamily):
         )
 
         def excess(size: float) -> float:
-            return self._log_slip_rate_after_step(size) - level
+            return self._compute_log_slip_rate_after_step(size) - level
 
         if excess(0.0) >= 0.0:
             return 0.0
-        largest = self._max_log_stress_ratio()
+        largest = self._compute_max_log_normal_stress_ratio()
         if excess(largest) > 0.0:
             self.largest_step_reaches_norm = True
             largest = float(brentq(excess, 0.0, largest, xtol=1e-15, rtol=1e-14))
         if self._allows_steady_sliding(largest):
             return largest
         self.largest_step_reaches_norm, smaller = False, 0.0
-        while largest - smaller > _RTOL_OF_MAX_STEP_SIZE * largest:
+        while largest - smaller > _RTOL_FOR_FINDING_MAX_STEP_SIZE * largest:
             middle = 0.5 * (smaller + largest)
             smaller, largest = (
                 (middle, largest) if self._allows_steady_sliding(middle) else (smaller, middle)
             )
         return smaller
 
-    def _max_log_stress_ratio(self) -> float:
+    def _compute_max_log_normal_stress_ratio(self) -> float:
         """Return the largest step size after which the normal stress is positive.
 
         If normal stress depends on shear stress, sigma_3 must remain positive after a decrease in
@@ -411,18 +418,18 @@ class NormalStressStepFamily(ShootingStepFamily):
         The result is also True if the load point is held, because steady sliding is not required in
         this case.
         """
-        scene = self.scene_with_step(step_size)
+        scene = self.build_scene_with_step(step_size)
         load = scene.log_load_velocity
         return load == -math.inf or scene.steady_sliding(load) is not None
 
-    def _log_slip_rate_after_step(self, step_size: float) -> float:
+    def _compute_log_slip_rate_after_step(self, step_size: float) -> float:
         """Return ln(V/V_*) immediately after the step, without inertia."""
-        scene = self.scene_with_step(step_size).without_mass()
+        scene = self.build_scene_with_step(step_size).without_mass()
         steady_states = scene.compute_steady_states(0.0, 0.0)
         return scene.slow_manifold_point(scene.spring_stress_step, steady_states).log_slip_rate
 
 
-def _reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:
+def _motion_reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:
     """Return True if a motion with a loose tolerance reaches the norm."""
-    loose = replace(integrator.accuracy, rtol=LOCAL_TOLERANCE_OF_FIRST_ROOT, refinement=1.0)
-    return motion_reaches_norm(scene, integrator.with_accuracy(loose))
+    loose = replace(integrator.accuracy, rtol=LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT, refinement=1.0)
+    return motion_reaches_instability_norm(scene, integrator.with_accuracy(loose))

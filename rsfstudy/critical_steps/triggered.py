@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.critical_steps.loading_checks import (
+    build_norm_below_load_velocity_outcome,
     build_slow_instability_norm_warning,
     check_loading_is_single_step,
-    outcome_if_norm_is_below_load_velocity,
 )
-from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.critical_steps.stability_after_step import is_neutrally_stable
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.measure_base import Measure, Outcome
@@ -82,11 +82,12 @@ class Triggered(Measure):
         """
         check_loading_is_single_step(scene)
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
-            return outcome_if_norm_is_below_load_velocity(scene, scene.load_velocity)
+            return build_norm_below_load_velocity_outcome(scene, scene.load_velocity)
         if not scene.is_perturbed:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
         answer, again = (
-            motion_reaches_norm(scene, each) for each in (integrator, integrator.refined())
+            motion_reaches_instability_norm(scene, each)
+            for each in (integrator, integrator.refined())
         )
         # If the stiffness is critical within the tolerance, growth and decay of perturbations are
         # indistinguishable.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     )
     from rsfstudy.execution.clusters import connect_to_cluster
     from rsfstudy.execution.preparation import prepare_study_run
-    from rsfstudy.execution.provenance import provenance_attributes, run_fingerprint
+    from rsfstudy.execution.provenance import build_provenance_attributes, collect_run_fingerprint
     from rsfstudy.execution.study_run import OutputOptions, ProgressCallback
     from rsfstudy.execution.worker_pool import WorkerPool
 else:
@@ -42,6 +42,6 @@ __all__ = [
     "WorkerPool",
     "connect_to_cluster",
     "prepare_study_run",
-    "provenance_attributes",
-    "run_fingerprint",
+    "build_provenance_attributes",
+    "collect_run_fingerprint",
 ]

@@ -32,8 +32,8 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.status import Status
-from rsfstudy.storage import OutputPacker, StoredCellRow
-from rsfstudy.study import STUDIES_PACKAGE, Cell, CellChanges
+from rsfstudy.storage import CellJournalRow, CellOutputPacker
+from rsfstudy.study import NAMED_STUDIES_PACKAGE, Cell, CellFieldChanges
 
 if TYPE_CHECKING:
     from rsfstudy.execution.cell_plan import CellBatchIterator, CellPlan
@@ -43,19 +43,19 @@ if TYPE_CHECKING:
 WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT = 10.0
 #: Time in s between two transfers of finished cells to the journal. The cells are not transferred
 #: one by one, because each write to the disk may take 30 ms.
-_FINISHED_CELLS_HANDOVER_INTERVAL = 0.5
+_SECONDS_BETWEEN_JOURNAL_TRANSFERS = 0.5
 #: Unique identifier of this process.
-_PROCESS_ID = uuid.uuid4().hex
+_UNIQUE_PROCESS_ID = uuid.uuid4().hex
 #: CPU time that Dask itself may use on a worker, as a fraction of the CPU time limit of a cell.
-_DASK_CPU_TIME_OVER_CELL_TIME = 0.25
+_DASK_CPU_TIME_OVER_CELL_TIME_LIMIT = 0.25
 #: Maximum length of a message in the journal, in characters.
-_MAX_MESSAGE_LENGTH = 2000
+_MAX_STORED_MESSAGE_LENGTH = 2000
 
-StoredCellRows = list[StoredCellRow]
+StoredCellRows = list[CellJournalRow]
 
 
 @dataclass(frozen=True)
-class CellTask:
+class SharedCellSettings:
     """Settings that all cells of a run have in common.
 
     Parameters
@@ -83,24 +83,26 @@ class CellTask:
     base_scene: Scene
     measure: Measure
     accuracy: Accuracy
-    time_limit: float = Defaults.CELL_TIME_LIMIT
+    cell_cpu_time_limit: float = Defaults.CELL_TIME_LIMIT
     user_parts: tuple[UserPart, ...] = ()
     user_stepper_classes: tuple[type, ...] = ()
     code_fingerprint: Mapping[str, str] = field(default_factory=dict)
-    origin_process_id: str = _PROCESS_ID
+    origin_process_id: str = _UNIQUE_PROCESS_ID
 
     @functools.cached_property
-    def output_packer(self) -> OutputPacker:
+    def output_packer(self) -> CellOutputPacker:
         """Object that converts the outputs of a cell to a row of the journal."""
-        return OutputPacker(self.measure)
+        return CellOutputPacker(self.measure)
 
 
 #: Type of the functions that compute cells. Such a function takes a task and an iterator of
 #: batches, and yields lists of finished cells in any order.
-CellBatchMapper = Callable[[CellTask, "CellBatchIterator"], Generator[StoredCellRows]]
+CellBatchMapper = Callable[[SharedCellSettings, "CellBatchIterator"], Generator[StoredCellRows]]
 
 
-def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[StoredCellRows]:
+def compute_cell_batches_serially(
+    cell_settings: SharedCellSettings, batches: CellBatchIterator
+) -> Generator[StoredCellRows]:
     """Compute cells one after the other in this process.
 
     Finished cells are yielded in groups, because writing a single cell to the journal may take
@@ -121,13 +123,17 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
     """
     finished: StoredCellRows = []
     handed_over, since = 0, time.monotonic()
-    for key, changes in (cell for some in batches for cell in batches.plan.select_cells(some)):
-        cell = changes.build_cell(task.base_scene)
-        outcome, seconds = compute_cell(task, cell, propagated_exceptions=(KeyboardInterrupt,))
-        finished.append(task.output_packer.pack_cell(key, outcome, seconds))
+    for key, changes in (
+        cell for some in batches for cell in batches.plan.iterate_keys_and_field_changes(some)
+    ):
+        cell = changes.build_cell(cell_settings.base_scene)
+        outcome, seconds = compute_cell(
+            cell_settings, cell, propagated_exceptions=(KeyboardInterrupt,)
+        )
+        finished.append(cell_settings.output_packer.pack_journal_row(key, outcome, seconds))
         if (
             len(finished) >= max(1, handed_over)
-            or time.monotonic() - since > _FINISHED_CELLS_HANDOVER_INTERVAL
+            or time.monotonic() - since > _SECONDS_BETWEEN_JOURNAL_TRANSFERS
         ):
             yield finished
             handed_over += len(finished)
@@ -135,7 +141,7 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
     yield finished
 
 
-def serialize_task(task: CellTask) -> bytes:
+def serialize_cell_settings(cell_settings: SharedCellSettings) -> bytes:
     """Serialise a task for the workers.
 
     The serialised task includes the code that workers cannot import. The serialised task also
@@ -157,10 +163,15 @@ def serialize_task(task: CellTask) -> bytes:
     InvalidValue
         If the measure, a part of the slider or a stepper cannot be serialised.
     """
-    cloudpickle.register_pickle_by_value(importlib.import_module(STUDIES_PACKAGE))
-    each: list[tuple[str, str, object]] = [("part", part.name, part) for part in task.user_parts]
-    each += [("engine", task.accuracy.engine, stepper) for stepper in task.user_stepper_classes]
-    for what, name, value in (*each, ("measure", task.measure.name, task)):
+    cloudpickle.register_pickle_by_value(importlib.import_module(NAMED_STUDIES_PACKAGE))
+    each: list[tuple[str, str, object]] = [
+        ("part", part.name, part) for part in cell_settings.user_parts
+    ]
+    each += [
+        ("engine", cell_settings.accuracy.engine, stepper)
+        for stepper in cell_settings.user_stepper_classes
+    ]
+    for what, name, value in (*each, ("measure", cell_settings.measure.name, cell_settings)):
         try:
             sent = cloudpickle.dumps(value)
         except Exception as error:
@@ -171,7 +182,7 @@ def serialize_task(task: CellTask) -> bytes:
 
 
 @functools.lru_cache(maxsize=4)
-def _load_cell_task(serialized_task: bytes) -> CellTask:
+def _load_cell_settings(serialized_settings: bytes) -> SharedCellSettings:
     """Load a task in a worker process.
 
     Raises
@@ -180,7 +191,7 @@ def _load_cell_task(serialized_task: bytes) -> CellTask:
         If the task cannot be loaded, or if the worker has different versions or different code.
     """
     try:
-        task: CellTask = cloudpickle.loads(serialized_task)
+        task: SharedCellSettings = cloudpickle.loads(serialized_settings)
     except Exception as error:
         raise RunError(
             f"a worker process cannot load the measure or a scene part ({type(error).__name__}: "
@@ -188,7 +199,7 @@ def _load_cell_task(serialized_task: bytes) -> CellTask:
             "the study file"
         ) from error
     used = *task.measure.code_classes, *task.user_parts, *task.user_stepper_classes
-    ours = provenance.code_fingerprint(task.accuracy.engine, used)
+    ours = provenance.collect_code_fingerprint(task.accuracy.engine, used)
     for name, wanted in task.code_fingerprint.items():
         if ours.get(name) != wanted:
             raise RunError(
@@ -199,7 +210,7 @@ def _load_cell_task(serialized_task: bytes) -> CellTask:
     return task
 
 
-def pack_cell_batch(plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
+def pack_cell_batch(cell_plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
     """Pack a batch of cells into as few bytes as possible.
 
     The batches are compressed because the Dask scheduler keeps all batches in memory. A batch
@@ -220,12 +231,12 @@ def pack_cell_batch(plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
     """
     cells = [
         (key, {n: getattr(v, "name", v) for n, v in of_scene.items()}, of_measure)
-        for key, (of_scene, of_measure) in plan.select_cells(cell_numbers)
+        for key, (of_scene, of_measure) in cell_plan.iterate_keys_and_field_changes(cell_numbers)
     ]
     return zlib.compress(pickle.dumps(cells), level=1)
 
 
-def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
+def compute_packed_cell_batch(serialized_settings: bytes, packed_batch: bytes) -> bytes:
     """Compute a packed batch of cells in a worker process.
 
     If the computation of a cell exceeds the time limit, the operating system terminates the worker
@@ -251,31 +262,33 @@ def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
         If the worker cannot load the task, or if the worker has different versions or different
         code.
     """
-    task = _load_cell_task(serialized_task)
+    task = _load_cell_settings(serialized_settings)
     finished: StoredCellRows = []
     began = time.monotonic()
     ours = (
-        task.origin_process_id == _PROCESS_ID
+        task.origin_process_id == _UNIQUE_PROCESS_ID
     )  # A worker may be a thread of the process of the user.
     if not ours:
-        Engine.compilation_log.create_context_while_compiling = _cpu_time_limits.suspend_temporarily
+        Engine.compilation_log.create_compilation_context = _cpu_time_limits.suspend_temporarily
     with (
         contextlib.nullcontext()
         if ours
-        else _cpu_time_limits.enforce_in_this_thread(task.time_limit)
+        else _cpu_time_limits.enforce_in_this_thread(task.cell_cpu_time_limit)
     ):
         SceneFields.register_user_parts(task.user_parts)
         Engine.register_user_steppers(task.user_stepper_classes)
         for key, *changes in pickle.loads(zlib.decompress(packed_batch)):
-            cell = CellChanges(*changes).build_cell(task.base_scene)
-            finished.append(task.output_packer.pack_cell(key, *compute_cell(task, cell)))
-            if time.monotonic() - began > _FINISHED_CELLS_HANDOVER_INTERVAL:
+            cell = CellFieldChanges(*changes).build_cell(task.base_scene)
+            finished.append(task.output_packer.pack_journal_row(key, *compute_cell(task, cell)))
+            if time.monotonic() - began > _SECONDS_BETWEEN_JOURNAL_TRANSFERS:
                 break
     return pickle.dumps(finished)
 
 
 def compute_cell(
-    task: CellTask, cell: Cell, propagated_exceptions: tuple[type[BaseException], ...] = ()
+    cell_settings: SharedCellSettings,
+    cell: Cell,
+    propagated_exceptions: tuple[type[BaseException], ...] = (),
 ) -> tuple[Outcome, float]:
     """Compute a single cell.
 
@@ -301,7 +314,9 @@ def compute_cell(
     """
     begin = time.perf_counter() - Engine.compilation_log.total_compilation_seconds
     try:
-        outcome = task.measure.with_(**cell.measure_changes)(cell.scene, task.accuracy)
+        outcome = cell_settings.measure.with_(**cell.measure_field_changes)(
+            cell.scene, cell_settings.accuracy
+        )
     except propagated_exceptions:
         raise
     except BaseException as error:  # A cell may raise SystemExit or CancelledError.
@@ -315,7 +330,9 @@ def compute_cell(
 
 def _shorten_message_for_storage(message: str) -> str:
     """Shorten a message, and escape characters that files cannot store."""
-    text = shorten_text(message, _MAX_MESSAGE_LENGTH).encode(errors="backslashreplace").decode()
+    text = (
+        shorten_text(message, _MAX_STORED_MESSAGE_LENGTH).encode(errors="backslashreplace").decode()
+    )
     return text.replace("\0", "\\0")
 
 
@@ -338,32 +355,34 @@ class _CpuTimeLimits:
         self._lock = threading.Lock()
 
     @contextlib.contextmanager
-    def enforce_in_this_thread(self, seconds: float) -> Iterator[None]:
+    def enforce_in_this_thread(self, cpu_time_limit: float) -> Iterator[None]:
         """Limit the CPU time that the current thread can use for a cell."""
-        self._update_threads_and_timers(1, seconds)
+        self._change_thread_count_and_timers(1, cpu_time_limit)
         try:
             yield
         finally:
-            self._update_threads_and_timers(-1, seconds)
+            self._change_thread_count_and_timers(-1, cpu_time_limit)
 
-    def _update_threads_and_timers(self, thread_ids: int, seconds: float) -> None:
+    def _change_thread_count_and_timers(
+        self, thread_count_change: int, cpu_time_limit: float
+    ) -> None:
         """Change the number of computing threads, and restart the CPU timers."""
         with self._lock:
-            self._active_threads += thread_ids
-            self._process_cpu_limit = self._active_threads * seconds
-            self._set_timers(self._process_cpu_limit)
+            self._active_threads += thread_count_change
+            self._process_cpu_limit = self._active_threads * cpu_time_limit
+            self._set_cpu_timers(self._process_cpu_limit)
 
     @contextlib.contextmanager
     def suspend_temporarily(self) -> Iterator[None]:
         """Suspend the CPU time limits during a ``with`` block."""
-        self._set_timers(0.0)
+        self._set_cpu_timers(0.0)
         try:
             yield
         finally:
-            self._set_timers(self._process_cpu_limit)
+            self._set_cpu_timers(self._process_cpu_limit)
 
     @staticmethod
-    def _set_timers(seconds: float) -> None:
+    def _set_cpu_timers(cpu_time_limit: float) -> None:
         """Set the CPU timers, or cancel the timers if the limit is 0 s.
 
         If a process exceeds the CPU time limit, the stack traces of all threads are written to the
@@ -371,15 +390,17 @@ class _CpuTimeLimits:
         """
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0.0)
-        if seconds:
+        if cpu_time_limit:
             faulthandler.dump_traceback_later(
-                WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT * seconds + _FINISHED_CELLS_HANDOVER_INTERVAL,
+                WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT * cpu_time_limit
+                + _SECONDS_BETWEEN_JOURNAL_TRANSFERS,
                 exit=True,
             )
             faulthandler.register(signal.SIGPROF, chain=True)  # The signal ends the process.
             signal.setitimer(
                 signal.ITIMER_PROF,
-                (1.0 + _DASK_CPU_TIME_OVER_CELL_TIME) * seconds + _FINISHED_CELLS_HANDOVER_INTERVAL,
+                (1.0 + _DASK_CPU_TIME_OVER_CELL_TIME_LIMIT) * cpu_time_limit
+                + _SECONDS_BETWEEN_JOURNAL_TRANSFERS,
             )
 
 

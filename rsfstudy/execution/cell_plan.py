@@ -20,8 +20,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion import Engine
 from rsfstudy.slider import Scene
-from rsfstudy.storage import LatticeCoordinates
-from rsfstudy.study import CellChanges, Study
+from rsfstudy.storage import LatticeCoordinatesBuilder
+from rsfstudy.study import CellFieldChanges, Study
 
 _CELL_KEY_DTYPE = np.dtype("V16")
 _GOLDEN_SECTION_RATIO = (math.sqrt(5.0) - 1.0) / 2.0
@@ -29,7 +29,11 @@ _GOLDEN_SECTION_RATIO = (math.sqrt(5.0) - 1.0) / 2.0
 #: small because all cells of a batch must be computed again if a machine fails.
 _TARGET_SECONDS_PER_BATCH, MAX_BATCH_SIZE = 0.3, 5000
 #: Typical time per right-hand-side evaluation in s, by engine, including all overheads.
-_SECONDS_PER_RHS_EVALUATION = {Engine.SCIPY: 1.2e-5, Engine.PYTHON: 8e-6, Engine.COMPILED: 5e-7}
+_SECONDS_PER_RHS_EVALUATION_BY_ENGINE = {
+    Engine.SCIPY: 1.2e-5,
+    Engine.PYTHON: 8e-6,
+    Engine.COMPILED: 5e-7,
+}
 
 
 def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
@@ -105,7 +109,7 @@ class CellPlan:
         self.study = study
         self.keys = np.empty(study.size, dtype=_CELL_KEY_DTYPE)
         example_scenes = dict[tuple[type, ...], Scene]()
-        self._coordinates = LatticeCoordinates(study)
+        self._coordinates = LatticeCoordinatesBuilder(study)
         self._scenes_for_coordinates = dict[int, Scene]()
         number = 0
         try:
@@ -116,16 +120,18 @@ class CellPlan:
                     self._scenes_for_coordinates[number] = scene
                 number += 1
         except InvalidValue as error:
-            raise _add_failure_counts_to_error(study, number, error) from None
+            raise _add_invalid_point_counts_to_error(study, number, error) from None
         self.example_scenes = list(example_scenes.values())
         self.unique_cell_numbers = np.sort(np.unique(self.keys, return_index=True)[1])
 
     @functools.cached_property
-    def coordinates(self) -> dict[Any, Any]:
+    def lattice_coordinates(self) -> dict[Any, Any]:
         """Coordinates of the lattice, in a form that ``xarray.Dataset`` accepts."""
-        return self._coordinates.build(self._scenes_for_coordinates)
+        return self._coordinates.build_coordinates(self._scenes_for_coordinates)
 
-    def select_cells(self, cell_numbers: np.ndarray) -> Iterator[tuple[bytes, CellChanges]]:
+    def iterate_keys_and_field_changes(
+        self, cell_numbers: np.ndarray
+    ) -> Iterator[tuple[bytes, CellFieldChanges]]:
         """Select cells by their numbers.
 
         Parameters
@@ -157,12 +163,12 @@ class CellPlan:
         """
         accuracy = self.study.accuracy
         work = len(self.unique_cell_numbers) * self.study.measure.expected_work(accuracy)
-        return round(work), work * _SECONDS_PER_RHS_EVALUATION.get(
-            accuracy.engine, _SECONDS_PER_RHS_EVALUATION[Engine.SCIPY]
+        return round(work), work * _SECONDS_PER_RHS_EVALUATION_BY_ENGINE.get(
+            accuracy.engine, _SECONDS_PER_RHS_EVALUATION_BY_ENGINE[Engine.SCIPY]
         )
 
 
-def _add_failure_counts_to_error(
+def _add_invalid_point_counts_to_error(
     study: Study, cell_number: int, first_error: InvalidValue
 ) -> InvalidValue:
     """Add the number of invalid axis points to the error message of a cell.

@@ -17,10 +17,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from rsfstudy.object_digest import ObjectDigest
-from rsfstudy.study import STUDIES_PACKAGE as STUDIES
+from rsfstudy.study import NAMED_STUDIES_PACKAGE as STUDIES
 
 _PACKAGE_NAME = Path(__file__).parent.parent.name
-_INSTALLATION_DIRECTORIES = tuple(
+_PYTHON_INSTALLATION_DIRECTORIES = tuple(
     Path(path).resolve()
     for path in {
         *(sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")),
@@ -30,7 +30,7 @@ _INSTALLATION_DIRECTORIES = tuple(
 )
 
 
-def digest_measures_of_studies(measure_classes: Iterable[type]) -> dict[str, str]:
+def digest_measures_of_named_studies(measure_classes: Iterable[type]) -> dict[str, str]:
     """Compute the digest of the measures that named studies define.
 
     Parameters
@@ -45,9 +45,9 @@ def digest_measures_of_studies(measure_classes: Iterable[type]) -> dict[str, str
         digest of the measures. The dictionary is empty if no class is defined in the module of a
         named study.
     """
-    theirs = tuple(kind for kind in measure_classes if _is_study_module(kind.__module__))
+    theirs = tuple(kind for kind in measure_classes if _is_module_of_named_study(kind.__module__))
     names = ", ".join(dict.fromkeys(kind.__module__.removeprefix("rsfstudy.") for kind in theirs))
-    return {names: _digest(theirs)} if theirs else {}
+    return {names: _compute_digest_of_objects(theirs)} if theirs else {}
 
 
 def digest_user_classes(*classes_or_data: object) -> str:
@@ -69,13 +69,15 @@ def digest_user_classes(*classes_or_data: object) -> str:
         for one in classes_or_data
         if not isinstance(one, type) or _is_user_module(one.__module__)
     )
-    return _digest(own) if own else "none"
+    return _compute_digest_of_objects(own) if own else "none"
 
 
-def _digest(objects: tuple[object, ...]) -> str:
+def _compute_digest_of_objects(objects: tuple[object, ...]) -> str:
     """Compute the digest of objects and of the code that the objects use."""
     return (
-        ObjectDigest(lambda m: _is_study_module(m) or _is_user_module(m)).add(objects).hexdigest()
+        ObjectDigest(lambda m: _is_module_of_named_study(m) or _is_user_module(m))
+        .add_object(objects)
+        .hexdigest()
     )
 
 
@@ -93,10 +95,10 @@ def is_defined_in_rsfstudy(defined_class: type) -> bool:
         False for user-defined classes and for classes in the modules of named studies.
     """
     module = defined_class.__module__
-    return module.partition(".")[0] == _PACKAGE_NAME and not _is_study_module(module)
+    return module.partition(".")[0] == _PACKAGE_NAME and not _is_module_of_named_study(module)
 
 
-def _is_study_module(module_name: str | None) -> bool:
+def _is_module_of_named_study(module_name: str | None) -> bool:
     """Return True if a module belongs to the named studies."""
     return (module_name or "").startswith(f"{STUDIES}.")
 
@@ -116,5 +118,5 @@ def _is_user_module(module_name: str | None) -> bool:
 def _is_installed_file(file_path: str | None) -> bool:
     """Return True if a file belongs to Python or to an installed package."""
     return file_path is not None and any(
-        Path(file_path).resolve().is_relative_to(p) for p in _INSTALLATION_DIRECTORIES
+        Path(file_path).resolve().is_relative_to(p) for p in _PYTHON_INSTALLATION_DIRECTORIES
     )

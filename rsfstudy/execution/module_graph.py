@@ -19,12 +19,12 @@ from types import CodeType
 from rsfstudy.object_digest import ObjectDigest
 
 _PACKAGE_NAME = __name__.partition(".")[0]
-_LAZY_EXPORT_FUNCTION = "build_lazy_export_functions"
-_TYPE_CHECKING_BRANCH = re.compile(rb"^(\s*if )TYPE_CHECKING:", re.MULTILINE)
-_DIGITS_PER_MODULE = 12
+_LAZY_EXPORT_FUNCTION_NAME = "build_lazy_export_functions"
+_TYPE_CHECKING_BRANCH_PATTERN = re.compile(rb"^(\s*if )TYPE_CHECKING:", re.MULTILINE)
+_DIGEST_DIGITS_PER_MODULE = 12
 
 
-class ModuleGraph:
+class ModuleImportGraph:
     """Import graph of source files.
 
     Parameters
@@ -36,21 +36,23 @@ class ModuleGraph:
 
     def __init__(self, sources_by_path: Mapping[str, bytes]) -> None:
         self._modules = {
-            path.removesuffix(".py").removesuffix("/__init__").replace("/", "."): _Module(text)
+            path.removesuffix(".py").removesuffix("/__init__").replace("/", "."): _ModuleSource(
+                text
+            )
             for path, text in sources_by_path.items()
         }
 
     @property
-    def names(self) -> Iterable[str]:
+    def module_names(self) -> Iterable[str]:
         """Names of the modules, relative to the package."""
         return self._modules
 
     @cached_property
     def combined_digest(self) -> str:
         """Single digest of all modules."""
-        return ObjectDigest(lambda _name: False).add(self.digests()).hexdigest()
+        return ObjectDigest(lambda _name: False).add_object(self.compute_digests()).hexdigest()
 
-    def digests(self, roots: Iterable[str] | None = None) -> dict[str, str]:
+    def compute_digests(self, root_modules: Iterable[str] | None = None) -> dict[str, str]:
         """Compute the digests of modules and of all modules that they import.
 
         Parameters
@@ -65,28 +67,44 @@ class ModuleGraph:
         dict of str to str
             Digest of each module, by name relative to the package, such as ``"slider.friction"``.
         """
-        reached = self._modules if roots is None else self._find_reachable_modules(roots)
-        return {module: self._modules[module].digest for module in sorted(reached)}
+        reached = (
+            self._modules if root_modules is None else self._find_reachable_modules(root_modules)
+        )
+        return {module: self._modules[module].code_digest for module in sorted(reached)}
 
-    def _find_reachable_modules(self, roots: Iterable[str]) -> set[str]:
+    def _find_reachable_modules(self, root_modules: Iterable[str]) -> set[str]:
         reached: set[str] = set()
-        found = {module for root in roots for module in self._modules_loaded_by(root, ())}
+        found = {
+            module
+            for root in root_modules
+            for module in self._iterate_modules_loaded_by_import(root, ())
+        }
         while found:
             reached |= found
-            imports = [statement for module in found for statement in self._modules[module].imports]
-            found = {m for statement in imports for m in self._modules_loaded_by(*statement)}
+            imports = [
+                statement
+                for module in found
+                for statement in self._modules[module].imported_modules_and_names
+            ]
+            found = {
+                m
+                for statement in imports
+                for m in self._iterate_modules_loaded_by_import(*statement)
+            }
             found -= reached
         return reached
 
-    def _modules_loaded_by(self, source: str, names: Iterable[str]) -> Iterator[str]:
+    def _iterate_modules_loaded_by_import(
+        self, source_module: str, imported_names: Iterable[str]
+    ) -> Iterator[str]:
         """Yield the modules that an import statement loads."""
-        path = source.removeprefix(_PACKAGE_NAME).removeprefix(".")
+        path = source_module.removeprefix(_PACKAGE_NAME).removeprefix(".")
         parts = path.split(".")
         for package in (".".join(parts[:length]) for length in range(1, len(parts) + 1)):
-            if package in self._modules and self._modules[package].lazy_exports is None:
+            if package in self._modules and self._modules[package].module_by_lazy_export is None:
                 yield package
-        modules = [f"{path}.{name}".removeprefix(".") for name in names]
-        exports = self._modules[path].lazy_exports if path in self._modules else None
+        modules = [f"{path}.{name}".removeprefix(".") for name in imported_names]
+        exports = self._modules[path].module_by_lazy_export if path in self._modules else None
         if exports is not None:
             exported = {f"{path}.{name}": module for name, module in exports.items()}
             modules = [exported.get(module, module) for module in modules]
@@ -96,43 +114,47 @@ class ModuleGraph:
                 modules = [*exports.values()]
         for module in modules:
             if module in self._modules:
-                yield from self._modules_loaded_by(f"{_PACKAGE_NAME}.{module}", ())
+                yield from self._iterate_modules_loaded_by_import(f"{_PACKAGE_NAME}.{module}", ())
 
 
-class _Module:
+class _ModuleSource:
     """Source file of a module."""
 
     def __init__(self, source: bytes) -> None:
-        self._source = _TYPE_CHECKING_BRANCH.sub(rb"\1False:", source)
+        self._source = _TYPE_CHECKING_BRANCH_PATTERN.sub(rb"\1False:", source)
 
     @cached_property
-    def _code(self) -> CodeType:
+    def _code_without_docstrings(self) -> CodeType:
         """Code of the module without docstrings and without imports for type annotations."""
         return compile(self._source, "module", "exec", optimize=2, dont_inherit=True)
 
     @cached_property
-    def digest(self) -> str:
+    def code_digest(self) -> str:
         """Digest of the code."""
-        return ObjectDigest(lambda _name: True).add(self._code).hexdigest(_DIGITS_PER_MODULE)
+        return (
+            ObjectDigest(lambda _name: True)
+            .add_object(self._code_without_docstrings)
+            .hexdigest(_DIGEST_DIGITS_PER_MODULE)
+        )
 
     @cached_property
-    def imports(self) -> list[tuple[str, list[str]]]:
+    def imported_modules_and_names(self) -> list[tuple[str, list[str]]]:
         """Package modules imported by this module, with the imported names."""
-        return _find_imports(self._code)
+        return _find_imports_from_package(self._code_without_docstrings)
 
     @cached_property
-    def lazy_exports(self) -> Mapping[str, str] | None:
+    def module_by_lazy_export(self) -> Mapping[str, str] | None:
         """Modules from which this module lazily exports names.
 
         Each key is an exported name, and each value is the name of a module. If the module does not
         export names lazily, the value is None.
         """
-        if _LAZY_EXPORT_FUNCTION.encode() not in self._source:
+        if _LAZY_EXPORT_FUNCTION_NAME.encode() not in self._source:
             return None
         tables = (
             ast.literal_eval(node.args[1])
             for node in ast.walk(ast.parse(self._source))
-            if isinstance(node, ast.Call) and ast.unparse(node.func) == _LAZY_EXPORT_FUNCTION
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == _LAZY_EXPORT_FUNCTION_NAME
         )
         return {
             entry.split(" as ")[-1]: module
@@ -142,7 +164,7 @@ class _Module:
         }
 
 
-def _find_imports(code: CodeType) -> list[tuple[str, list[str]]]:
+def _find_imports_from_package(code: CodeType) -> list[tuple[str, list[str]]]:
     """Find the package modules that the code imports, with the imported names.
 
     A string that is the name of a module is treated as an import, because the code may pass the
@@ -158,7 +180,7 @@ def _find_imports(code: CodeType) -> list[tuple[str, list[str]]]:
                 found[-1][1].append(instruction.argval)
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            found += _find_imports(constant)
+            found += _find_imports_from_package(constant)
         elif isinstance(constant, str):
             found.append((constant, []))
     return [(source, names) for source, names in found if f"{source}.".startswith(prefix)]

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from rsfstudy.execution import provenance
-from rsfstudy.execution.cell_computation import CellTask, compute_serially, serialize_task
+from rsfstudy.execution.cell_computation import (
+    SharedCellSettings,
+    compute_cell_batches_serially,
+    serialize_cell_settings,
+)
 from rsfstudy.execution.study_run import OutputOptions, StudyRun
 from rsfstudy.execution.worker_pool import WorkerPool
 from rsfstudy.motion import Engine
 from rsfstudy.study import Study
 
 
-def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool) -> StudyRun:
+def prepare_study_run(
+    study: Study, output_options: OutputOptions, worker_pool: WorkerPool
+) -> StudyRun:
     """Prepare to run a study on workers.
 
     Parameters
@@ -32,15 +38,19 @@ def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool)
     InvalidValue
         If the study is invalid, or if the code of the study cannot be sent to the workers.
     """
-    task = CellTask(
+    task = SharedCellSettings(
         study.base,
         study.measure,
         study.accuracy,
-        workers.cell_time_limit,
+        worker_pool.cell_time_limit,
         user_parts=tuple(study.user_parts.values()),
         user_stepper_classes=Engine.find_user_stepper(study.accuracy.engine),
-        code_fingerprint=provenance.code_fingerprint(study.accuracy.engine, study.user_classes),
+        code_fingerprint=provenance.collect_code_fingerprint(
+            study.accuracy.engine, study.user_classes
+        ),
     )
-    if workers.make_cell_batch_mapper() is not compute_serially:
-        serialize_task(task)  # Serialisation errors are raised here, before any cell is computed.
-    return StudyRun(study, options, task, workers.count_concurrent_cells())
+    if worker_pool.make_cell_batch_mapper() is not compute_cell_batches_serially:
+        serialize_cell_settings(
+            task
+        )  # Serialisation errors are raised here, before any cell is computed.
+    return StudyRun(study, output_options, task, worker_pool.count_concurrent_cells())

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.execution import code_digest
-from rsfstudy.execution.module_graph import ModuleGraph
+from rsfstudy.execution.module_graph import ModuleImportGraph
 from rsfstudy.motion import Engine
 from rsfstudy.slider import Scene
 
@@ -42,7 +42,7 @@ _PACKAGES_AFFECTING_CELL_RESULTS = (
 )
 
 
-def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
+def read_physics_source_files(package_directory: Path) -> dict[str, bytes]:
     """Read the source files that may affect the results of cells.
 
     Parameters
@@ -65,10 +65,10 @@ def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
 
 #: Import graph of the source files at the time of the import. The source files are read only once,
 #: because later changes of the files do not affect the running code.
-_modules_at_import = ModuleGraph(read_physics_sources(_PACKAGE_DIRECTORY))
+_import_graph_at_import_time = ModuleImportGraph(read_physics_source_files(_PACKAGE_DIRECTORY))
 
 
-def code_fingerprint(
+def collect_code_fingerprint(
     engine: str = Engine.SCIPY, user_classes: Iterable[object] = ()
 ) -> dict[str, str]:
     """Collect the versions and code digests that affect the results of cells.
@@ -86,17 +86,17 @@ def code_fingerprint(
         Versions and digests by name.
     """
     return {
-        "physics": _modules_at_import.combined_digest,
+        "physics": _import_graph_at_import_time.combined_digest,
         "own_code": code_digest.digest_user_classes(*user_classes),
         # The Python version affects the byte code.
         "python": f"{sys.version_info.major}.{sys.version_info.minor}",
         "numpy": version("numpy"),
         "scipy": version("scipy"),
-        **package_versions(engine),
+        **find_engine_package_versions(engine),
     }
 
 
-def digest_reachable_modules(measure: Measure, scenes: Iterable[Scene]) -> dict[str, str]:
+def digest_reachable_modules(measure: Measure, example_scenes: Iterable[Scene]) -> dict[str, str]:
     """Compute the code digests of the modules that a measure and scenes use.
 
     The digests include all modules that the measure and the parts of the scenes import, directly
@@ -117,19 +117,21 @@ def digest_reachable_modules(measure: Measure, scenes: Iterable[Scene]) -> dict[
     """
     if not all(map(code_digest.is_defined_in_rsfstudy, measure.code_classes)):
         return {
-            **_modules_at_import.digests(),
-            **code_digest.digest_measures_of_studies(measure.code_classes),
+            **_import_graph_at_import_time.compute_digests(),
+            **code_digest.digest_measures_of_named_studies(measure.code_classes),
         }
-    parts = {type(part) for scene in scenes for part in scene.parts}
+    parts = {type(part) for scene in example_scenes for part in scene.parts}
     roots = {kind.__module__ for kind in (Scene, *measure.code_classes, *parts)}
     if not all(map(code_digest.is_defined_in_rsfstudy, parts)):
         roots |= {
-            f"rsfstudy.{name}" for name in _modules_at_import.names if name.startswith("slider.")
+            f"rsfstudy.{name}"
+            for name in _import_graph_at_import_time.module_names
+            if name.startswith("slider.")
         }
-    return _modules_at_import.digests(roots)
+    return _import_graph_at_import_time.compute_digests(roots)
 
 
-def run_fingerprint(study: Study, scenes: Iterable[Scene]) -> dict[str, Any]:
+def collect_run_fingerprint(study: Study, example_scenes: Iterable[Scene]) -> dict[str, Any]:
     """Collect all settings, versions and digests that affect the results.
 
     The fingerprint contains neither the scene fields nor the measure fields, because the keys of
@@ -156,12 +158,14 @@ def run_fingerprint(study: Study, scenes: Iterable[Scene]) -> dict[str, Any]:
         "budget": accuracy.budget,
         "methods": [list(pair) for pair in accuracy.methods],
         "engine": accuracy.engine,
-        **code_fingerprint(accuracy.engine, study.user_classes),
-        "physics": digest_reachable_modules(study.measure, scenes),
+        **collect_code_fingerprint(accuracy.engine, study.user_classes),
+        "physics": digest_reachable_modules(study.measure, example_scenes),
     }
 
 
-def collect_provenance(study: Study, command_line: str, scenes: Iterable[Scene]) -> dict[str, Any]:
+def collect_provenance(
+    study: Study, command_line: str, example_scenes: Iterable[Scene]
+) -> dict[str, Any]:
     """Collect the provenance of a run.
 
     Parameters
@@ -186,7 +190,7 @@ def collect_provenance(study: Study, command_line: str, scenes: Iterable[Scene])
             "python": platform.python_version(),
             **{name: version(name) for name in _PACKAGES_WITH_RECORDED_VERSION},
         },
-        "fingerprint": run_fingerprint(study, scenes),
+        "fingerprint": collect_run_fingerprint(study, example_scenes),
         "git": read_git_commit_and_state(_PACKAGE_DIRECTORY.parent),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "mathematical_library": " ".join(platform.libc_ver()).strip() or "unknown",
@@ -194,7 +198,7 @@ def collect_provenance(study: Study, command_line: str, scenes: Iterable[Scene])
     }
 
 
-def provenance_attributes(command_line: str) -> dict[str, str]:
+def build_provenance_attributes(command_line: str) -> dict[str, str]:
     """Build the root attributes that describe the origin of a dataset.
 
     The function is used for datasets that contain a single scene.
@@ -272,7 +276,7 @@ def read_git_commit_and_state(checkout_directory: Path) -> str:
     return stamp.read_text().strip() if stamp.exists() else "none"
 
 
-def package_versions(name: str) -> dict[str, str]:
+def find_engine_package_versions(engine_name: str) -> dict[str, str]:
     """Return the versions of the additional packages that an engine requires.
 
     The versions of NumPy and SciPy are not included, because ``code_fingerprint`` adds these
@@ -289,7 +293,7 @@ def package_versions(name: str) -> dict[str, str]:
         Versions by package name. The dictionary is empty unless the engine compiles the equations
         of motion.
     """
-    if name != Engine.COMPILED:
+    if engine_name != Engine.COMPILED:
         return {}
     # The versions are read from the metadata, because importing numba would delay every command.
     from importlib.metadata import PackageNotFoundError, version

@@ -18,16 +18,16 @@ import xarray as xr
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.execution import provenance
-from rsfstudy.execution.cell_computation import CellBatchMapper, CellTask, StoredCellRows
+from rsfstudy.execution.cell_computation import CellBatchMapper, SharedCellSettings, StoredCellRows
 from rsfstudy.execution.cell_plan import CellBatchIterator, CellPlan, order_cells_by_golden_section
-from rsfstudy.execution.time_estimate import TimeEstimate
+from rsfstudy.execution.time_estimate import RemainingTimeEstimator
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.status import Status
 from rsfstudy.storage import (
-    CellColumns,
     CellJournal,
+    CellResultArrays,
     ZarrStore,
-    assemble_dataset,
+    assemble_study_dataset,
     convert_attributes_for_netcdf,
     write_dataset,
 )
@@ -84,7 +84,7 @@ class OutputOptions:
         if self.format not in Defaults.RESULT_FORMATS:
             raise InvalidValue("format", self.format, "is unknown", choices=Defaults.RESULT_FORMATS)
         if self.format == "zarr":
-            ZarrStore.check_installed()
+            ZarrStore.check_zarr_is_installed()
             if self.output is None:
                 raise InvalidValue("output", None, "must be a directory if the format is Zarr")
 
@@ -115,9 +115,18 @@ class StudyRun:
     """
 
     def __init__(
-        self, study: Study, options: OutputOptions, task: CellTask, workers: int = 1
+        self,
+        study: Study,
+        options: OutputOptions,
+        cell_settings: SharedCellSettings,
+        workers: int = 1,
     ) -> None:
-        self.study, self.options, self.task, self.workers = study, options, task, workers
+        self.study, self.options, self.cell_settings, self.workers = (
+            study,
+            options,
+            cell_settings,
+            workers,
+        )
         self.plan = CellPlan(study)
         self.provenance = provenance.collect_provenance(
             study, options.command_line, self.plan.example_scenes
@@ -131,10 +140,12 @@ class StudyRun:
         cell is computed. If the user changed values of the study, for example with ``--set``, the
         claims are not checked.
         """
-        pending = CellColumns.build_pending_cells(
-            self.study.size, self.task.output_packer.packed_number_count
+        pending = CellResultArrays.build_for_pending_cells(
+            self.study.size, self.cell_settings.output_packer.packed_number_count
         )
-        lattice = assemble_dataset(self.study, self.plan.coordinates, pending, self.provenance)
+        lattice = assemble_study_dataset(
+            self.study, self.plan.lattice_coordinates, pending, self.provenance
+        )
         for reduction in self.study.reductions:
             try:
                 lattice = apply_reductions(lattice, (reduction,))
@@ -146,7 +157,7 @@ class StudyRun:
         for claim in () if self.study.overrides else self.study.claims:
             claim.check_selection(lattice)
 
-    def output_path(self, file_suffix: str) -> Path:
+    def build_output_path(self, file_suffix: str) -> Path:
         """Return the path of an output file of this run.
 
         Parameters
@@ -165,7 +176,7 @@ class StudyRun:
     @property
     def worker_log_path(self) -> Path | None:
         """Path of the worker log, or None if there is no output directory."""
-        return None if self.options.output is None else self.output_path(".workers.log")
+        return None if self.options.output is None else self.build_output_path(".workers.log")
 
     def __call__(
         self, cell_batch_mapper: CellBatchMapper, progress_callback: ProgressCallback
@@ -203,9 +214,9 @@ class StudyRun:
         """
         keeping = self.options
         if keeping.format == "zarr":
-            ZarrStore(self.output_path(".zarr")).check_does_not_exist()
-        path = None if keeping.output is None else self.output_path(".cells.sqlite")
-        fingerprint, layout = self.provenance["fingerprint"], self.task.output_packer
+            ZarrStore(self.build_output_path(".zarr")).check_does_not_exist()
+        path = None if keeping.output is None else self.build_output_path(".cells.sqlite")
+        fingerprint, layout = self.provenance["fingerprint"], self.cell_settings.output_packer
         with CellJournal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
             try:
                 self._compute_missing_cells(journal, cell_batch_mapper, progress_callback)
@@ -224,7 +235,7 @@ class StudyRun:
         """Compute the cells that are not in the journal, and failed cells."""
         cells = self.plan.unique_cell_numbers
         # Failed cells are computed again.
-        answered = journal.statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
+        answered = journal.read_statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
         missing = order_cells_by_golden_section(cells[~answered])
         done, failed, total = int(answered.sum()), 0, len(cells)
         progress_callback(done, total, None)
@@ -233,8 +244,8 @@ class StudyRun:
         if not len(missing):
             return
         batches = CellBatchIterator(self.plan, missing, self.workers)
-        estimate = TimeEstimate(self.workers)
-        with contextlib.closing(cell_batch_mapper(self.task, batches)) as arriving:
+        estimate = RemainingTimeEstimator(self.workers)
+        with contextlib.closing(cell_batch_mapper(self.cell_settings, batches)) as arriving:
             for finished in arriving:
                 journal.add_cells(finished)
                 self._warn_of_lost_cells(finished)
@@ -243,7 +254,7 @@ class StudyRun:
                     estimate.record_cell_time(row[4])
                     failed += row[1] not in _NAMES_OF_ANSWER_STATUSES
                 done += len(finished)
-                progress_callback(done, total, estimate.remaining_seconds(total - done))
+                progress_callback(done, total, estimate.estimate_remaining_seconds(total - done))
                 if (
                     failed == done >= _MAX_FAILURES_WITHOUT_SUCCESS
                     and done < total
@@ -284,9 +295,9 @@ class StudyRun:
             raise RunError(f"a reduction failed ({type(error).__name__}: {error})") from error
         if self.options.output is None:
             return convert_attributes_for_netcdf(results)
-        written = results if zarr else write_dataset(results, self.output_path(".nc"))
+        written = results if zarr else write_dataset(results, self.build_output_path(".nc"))
         for stale in (".partial.nc", ".partial.png"):
-            self.output_path(stale).unlink(missing_ok=True)
+            self.build_output_path(stale).unlink(missing_ok=True)
         return written
 
     def assemble_lattice_dataset(self, journal: CellJournal) -> xr.Dataset:
@@ -303,19 +314,21 @@ class StudyRun:
             Dataset with all cells of the study. Cells that are not in the journal are pending.
         """
         cells = journal.read_cells(self.plan.keys)
-        return assemble_dataset(self.study, self.plan.coordinates, cells, self.provenance)
+        return assemble_study_dataset(
+            self.study, self.plan.lattice_coordinates, cells, self.provenance
+        )
 
     def _apply_reductions(self, lattice: xr.Dataset) -> xr.Dataset:
         despite = self.options.despite_failures
         return apply_reductions(lattice, tuple(self.study.reductions), despite_failures=despite)
 
     def _write_zarr_in_slabs(self, journal: CellJournal) -> xr.Dataset:
-        def read(some: slice) -> CellColumns:
+        def read(some: slice) -> CellResultArrays:
             return journal.read_cells(self.plan.keys[some])
 
-        return ZarrStore(self.output_path(".zarr")).write(
+        return ZarrStore(self.build_output_path(".zarr")).write_study_results(
             self.study,
-            self.plan.coordinates,
+            self.plan.lattice_coordinates,
             read,
             self.provenance,
             self._apply_reductions,
@@ -329,7 +342,7 @@ class StudyRun:
             with contextlib.suppress(Exception):  # Reductions may fail for missing cells.
                 lattice = self._apply_reductions(lattice)
             try:
-                write_dataset(lattice, self.output_path(".partial.nc"))
+                write_dataset(lattice, self.build_output_path(".partial.nc"))
             except DataError as unwritten:
                 why += f"{unwritten} "
         kind = Interrupted if isinstance(error, KeyboardInterrupt) else RunError
@@ -337,9 +350,9 @@ class StudyRun:
 
     def _describe_how_to_resume(self, journal: CellJournal) -> str:
         """Describe how many cells are finished, and how to resume the run."""
-        known = int((journal.statuses(self.plan.keys) != int(Status.PENDING)).sum())
+        known = int((journal.read_statuses(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.options.output is None:
             return f"{text}. The finished cells are lost, because the run has no output directory."
-        where = self.output_path(".cells.sqlite")
+        where = self.build_output_path(".cells.sqlite")
         return f"{text} and stored in {where}. To resume the run, run the same command again."

@@ -10,7 +10,7 @@ import math
 _MIN_TIMED_CELLS, _MAX_RELATIVE_STDERR = 12, 0.2
 
 
-class TimeEstimate:
+class RemainingTimeEstimator:
     """Estimate of the time needed to compute the remaining cells of a run.
 
     The first cells of a run are spread over the whole lattice (see
@@ -39,7 +39,7 @@ class TimeEstimate:
             self._sum += seconds
             self._sum_of_squares += seconds * seconds
 
-    def remaining_seconds(self, cell_count: int) -> float | None:
+    def estimate_remaining_seconds(self, remaining_cell_count: int) -> float | None:
         """Estimate the time needed to compute the remaining cells.
 
         Parameters
@@ -59,4 +59,4 @@ class TimeEstimate:
         variance = max(0.0, self._sum_of_squares / self._count - mean * mean)
         if math.sqrt(variance / self._count) > _MAX_RELATIVE_STDERR * mean:
             return None
-        return cell_count * mean / self._worker_count
+        return remaining_cell_count * mean / self._worker_count

@@ -20,7 +20,7 @@ from distributed import WorkerPlugin
 
 from rsfstudy.errors import DataError
 
-_STDERR_FILE_NUMBER = 2
+_STDERR_FILE_DESCRIPTOR = 2
 #: Names of the loggers of Dask and of the libraries that Dask uses.
 _NAMES_OF_DASK_LOGGERS = ("distributed", "tornado", "asyncio")
 
@@ -55,7 +55,7 @@ def open_worker_log(log_path: Path | None) -> Iterator[Path]:
     except OSError as error:
         raise DataError(f"cannot write {log_path or 'a temporary file'}: {error}.") from error
     try:
-        with _redirect_loggers(log_path):
+        with _redirect_dask_loggers(log_path):
             yield log_path
     finally:
         with contextlib.suppress(OSError):
@@ -64,7 +64,7 @@ def open_worker_log(log_path: Path | None) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def _redirect_loggers(log_file: Path) -> Iterator[None]:
+def _redirect_dask_loggers(log_file: Path) -> Iterator[None]:
     """Redirect the errors that Dask logs in this process to a file."""
     handler = logging.FileHandler(log_file, delay=True)
     handler.setLevel(logging.ERROR)
@@ -105,5 +105,5 @@ class RedirectStderrPlugin(WorkerPlugin):
             return
         with contextlib.suppress(OSError):
             file = os.open(self.log_path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-            os.dup2(file, _STDERR_FILE_NUMBER)
+            os.dup2(file, _STDERR_FILE_DESCRIPTOR)
             os.close(file)

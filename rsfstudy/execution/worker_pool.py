@@ -27,12 +27,12 @@ from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.execution.cell_computation import (
     WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT,
     CellBatchMapper,
-    CellTask,
+    SharedCellSettings,
     StoredCellRows,
-    compute_batch,
-    compute_serially,
+    compute_cell_batches_serially,
+    compute_packed_cell_batch,
     pack_cell_batch,
-    serialize_task,
+    serialize_cell_settings,
 )
 from rsfstudy.execution.cell_plan import CellBatchIterator
 from rsfstudy.execution.clusters import check_script_has_main_guard, start_local_cluster
@@ -42,14 +42,14 @@ from rsfstudy.status import Status
 #: Largest allowed time limit of a cell in s, about three years. The wall time limit is
 #: ``WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT`` times this value, which is just below the largest value
 #: that the timers of the operating system accept.
-_MAX_TIME_LIMIT = 1e8
+_MAX_CELL_TIME_LIMIT = 1e8
 #: Maximum number of worker processes per core, and maximum number of worker processes on a machine
 #: with one or two cores.
 _MAX_WORKERS_PER_CORE, _MAX_WORKERS_ON_SMALL_MACHINES = 4, 8
 #: Times in s that a run waits for a worker. After the first time without a worker, the run issues a
 #: warning. After the second time, the run ends.
 WARN_AFTER_SECONDS_WITHOUT_WORKER, GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER = 30.0, 600.0
-_POLL_INTERVAL = 2.0
+_SECONDS_BETWEEN_FUTURE_POLLS = 2.0
 #: Number of workers that a cell may kill. After this number of workers, the cell is recorded as
 #: lost.
 _MAX_WORKER_DEATHS_PER_CELL = 2
@@ -111,8 +111,8 @@ class WorkerPool(contextlib.ExitStack):
         if dask_client is not None and not hasattr(dask_client, "submit"):
             raise InvalidValue("client", dask_client, "must be a distributed.Client")
         limit: object = cell_time_limit
-        if not isinstance(limit, int | float) or not 0.0 < limit <= _MAX_TIME_LIMIT:
-            rule = f"must be a number greater than 0 and at most {_MAX_TIME_LIMIT:g} s"
+        if not isinstance(limit, int | float) or not 0.0 < limit <= _MAX_CELL_TIME_LIMIT:
+            rule = f"must be a number greater than 0 and at most {_MAX_CELL_TIME_LIMIT:g} s"
             raise InvalidValue("time_limit", limit, rule)
         self.process_count, self.client, self.cell_time_limit, self._log_path = (
             process_count,
@@ -159,11 +159,11 @@ class WorkerPool(contextlib.ExitStack):
         return (
             functools.partial(self._compute_batches_on_processes, self._log_path or log_path)
             if self.process_count
-            else compute_serially
+            else compute_cell_batches_serially
         )
 
     def _compute_batches_on_processes(
-        self, log_path: Path | None, task: CellTask, batches: CellBatchIterator
+        self, log_path: Path | None, cell_settings: SharedCellSettings, batches: CellBatchIterator
     ) -> Generator[StoredCellRows]:
         """Compute batches on local worker processes, and start them if necessary."""
         from rsfstudy.execution import worker_log
@@ -173,7 +173,7 @@ class WorkerPool(contextlib.ExitStack):
                 file = self.enter_context(worker_log.open_worker_log(log_path))
                 client = self.enter_context(start_local_cluster(self.process_count, file))
                 self._mapper_of_started_processes = make_dask_batch_mapper(client, str(file))
-            yield from self._mapper_of_started_processes(task, batches)
+            yield from self._mapper_of_started_processes(cell_settings, batches)
         except RunError:
             self.close()
             self._mapper_of_started_processes = None  # The next run starts new processes.
@@ -201,8 +201,10 @@ def make_dask_batch_mapper(
         Function that takes a ``CellTask`` and a ``CellBatchIterator``, and yields finished cells.
     """
 
-    def map_cells(task: CellTask, batches: CellBatchIterator) -> Generator[StoredCellRows]:
-        sent, plan = serialize_task(task), batches.plan
+    def map_cells(
+        task: SharedCellSettings, batches: CellBatchIterator
+    ) -> Generator[StoredCellRows]:
+        sent, plan = serialize_cell_settings(task), batches.plan
         # These cells are the remainders of batches that a worker returned early.
         left: list[np.ndarray] = []
         running: dict[Any, np.ndarray] = {}
@@ -210,7 +212,7 @@ def make_dask_batch_mapper(
 
         def submit(cells: np.ndarray) -> Any:
             future = dask_client.submit(
-                compute_batch, sent, pack_cell_batch(plan, cells), pure=False
+                compute_packed_cell_batch, sent, pack_cell_batch(plan, cells), pure=False
             )
             running[future] = cells
             return future
@@ -228,11 +230,17 @@ def make_dask_batch_mapper(
                 began = time.monotonic()
                 _wait_for_finished_futures(dask_client, [future := submit(cell)])
                 del running[future]
-                if (finished := _batch_result(future)) is not None:
+                if (finished := _load_finished_cells_of_batch(future)) is not None:
                     return finished
-                if (seconds := time.monotonic() - began) > task.time_limit:
-                    return [task.output_packer.pack_cell(key, _timeout_outcome(task), seconds)]
-            return [task.output_packer.pack_cell(key, _worker_lost_outcome(), math.nan)]
+                if (seconds := time.monotonic() - began) > task.cell_cpu_time_limit:
+                    return [
+                        task.output_packer.pack_journal_row(
+                            key, _make_outcome_of_exceeded_time_limit(task), seconds
+                        )
+                    ]
+            return [
+                task.output_packer.pack_journal_row(key, _make_outcome_of_lost_worker(), math.nan)
+            ]
 
         try:
             while True:
@@ -247,7 +255,7 @@ def make_dask_batch_mapper(
                 if running:
                     for future in _wait_for_finished_futures(dask_client, running):
                         cells = running.pop(future)
-                        finished = _batch_result(future)
+                        finished = _load_finished_cells_of_batch(future)
                         if finished is None:
                             suspects += np.split(cells, len(cells))
                         else:
@@ -270,17 +278,17 @@ def make_dask_batch_mapper(
     return map_cells
 
 
-def _timeout_outcome(task: CellTask) -> Outcome:
+def _make_outcome_of_exceeded_time_limit(cell_settings: SharedCellSettings) -> Outcome:
     """Build the outcome of a cell that exceeded its time limit."""
     text = (
-        f"the cell exceeded {task.time_limit:g} s of CPU time, or "
+        f"the cell exceeded {cell_settings.cell_cpu_time_limit:g} s of CPU time, or "
         f"{WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT:g} times as much wall time. The worker log "
         "contains a stack trace. Increase the limit with --time-limit (time_limit=)"
     )
     return Outcome(Status.TIME_LIMIT_SPENT, message=text)
 
 
-def _worker_lost_outcome() -> Outcome:
+def _make_outcome_of_lost_worker() -> Outcome:
     """Build the outcome of a cell whose worker died."""
     text = (
         f"the worker process ended {_MAX_WORKER_DEATHS_PER_CELL} times while computing only "
@@ -334,7 +342,9 @@ def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any])
     while True:
         try:
             done: Iterable[Any] = wait(
-                list(running_futures), timeout=_POLL_INTERVAL, return_when="FIRST_COMPLETED"
+                list(running_futures),
+                timeout=_SECONDS_BETWEEN_FUTURE_POLLS,
+                return_when="FIRST_COMPLETED",
             ).done
             return done
         except TimeoutError:
@@ -357,7 +367,7 @@ def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any])
             raise RunError(_SCHEDULER_LOST_MESSAGE) from error
 
 
-def _batch_result(future: Any) -> StoredCellRows | None:
+def _load_finished_cells_of_batch(future: Any) -> StoredCellRows | None:
     """Return the finished cells of a batch, or None if its worker died.
 
     Raises

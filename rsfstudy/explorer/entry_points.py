@@ -49,7 +49,7 @@ def explore(source: Any = None, state: str | None = None) -> Any:
     >>> page = rsfstudy.explore(scene)  # doctest: +SKIP
     """
     _check_panel_is_installed()
-    return create_view(source, state).panel()
+    return create_view(source, state).build_page()
 
 
 def serve(
@@ -58,7 +58,7 @@ def serve(
     *,
     port: int | None = None,
     open_browser: bool = True,
-    announce: Callable[[str], None] = print,
+    announce_address: Callable[[str], None] = print,
 ) -> None:
     """Serve a view to the browser of this computer until the process is interrupted.
 
@@ -84,7 +84,7 @@ def serve(
     """
     _check_panel_is_installed()
     server = importlib.import_module("rsfstudy.explorer.server").ExplorerServer(source, state, port)
-    server.run(open_browser=open_browser, announce=announce)
+    server.run(open_browser=open_browser, announce=announce_address)
 
 
 def _check_panel_is_installed() -> None:

@@ -11,7 +11,7 @@ import panel as pn
 #: Rules with which parts declare fields that have no negative values.
 POSITIVE, NON_NEGATIVE = "must be greater than 0", "must be 0 or greater"
 #: Steps of a slider.
-_STEPS = 200
+_SLIDER_STEP_COUNT = 200
 #: Ratio of the largest value of a slider to the typical value, for fields without a scale, such as
 #: a, and for times and velocities.
 _RATIO_OF_PLAIN_FIELD, _RATIO_OF_SCALED_FIELD = 4.0, 100.0
@@ -33,10 +33,12 @@ class SliderRange(NamedTuple):
     low: float
     high: float
     is_logarithmic: bool = False
-    is_whole: bool = False
+    has_only_whole_numbers: bool = False
 
     @classmethod
-    def of_field(cls, default: float, typical: float, rule: str, scale: str) -> SliderRange:
+    def choose_for_field(
+        cls, default_value: float, typical_value: float, rule: str, scale_name: str
+    ) -> SliderRange:
         """Choose the range of a field from its declaration.
 
         Parameters
@@ -55,25 +57,25 @@ class SliderRange(NamedTuple):
         SliderRange
             Range. The box accepts values outside the range.
         """
-        high = _RATIO_OF_PLAIN_FIELD * typical
+        high = _RATIO_OF_PLAIN_FIELD * typical_value
         if "whole number" in rule:
-            return cls(0.0, max(20.0, 2.0 * typical), is_whole=True)
+            return cls(0.0, max(20.0, 2.0 * typical_value), is_whole=True)
         if "between 0 and 1" in rule:
             return cls(0.0, 1.0)
-        if rule == POSITIVE or (rule == NON_NEGATIVE and scale in ("V_*", "D_c/V_*")):
-            ratio = _RATIO_OF_SCALED_FIELD if scale else _RATIO_OF_PLAIN_FIELD
-            return cls(typical / ratio, typical * ratio, is_logarithmic=True)
-        return cls(0.0 if rule == NON_NEGATIVE or default else -high, high)
+        if rule == POSITIVE or (rule == NON_NEGATIVE and scale_name in ("V_*", "D_c/V_*")):
+            ratio = _RATIO_OF_SCALED_FIELD if scale_name else _RATIO_OF_PLAIN_FIELD
+            return cls(typical_value / ratio, typical_value * ratio, is_logarithmic=True)
+        return cls(0.0 if rule == NON_NEGATIVE or default_value else -high, high)
 
-    def value_at(self, position: float) -> float:
+    def convert_position_to_value(self, position: float) -> float:
         """Return the value at a position between 0 and 1, with 4 significant digits."""
         if self.is_logarithmic:
             value = self.low * (self.high / self.low) ** position
         else:
             value = self.low + (self.high - self.low) * position
-        return float(round(value) if self.is_whole else f"{value:.4g}")
+        return float(round(value) if self.has_only_whole_numbers else f"{value:.4g}")
 
-    def position_of(self, value: float) -> float:
+    def convert_value_to_position(self, value: float) -> float:
         """Return the position of a value, or the nearest end of the slider."""
         if not self.is_logarithmic:
             position = (value - self.low) / (self.high - self.low)
@@ -120,30 +122,34 @@ class NumberWidget:
         """Create the widgets."""
         self._limits, self._changed, self._is_moved_by_code = limits, changed, False
         self._slider = pn.widgets.FloatSlider(
-            label=label, start=0.0, end=1.0, step=1.0 / _STEPS, show_value=False, width=145,
-            value=limits.position_of(value or 0.0), tooltips=False,
+            label=label, start=0.0, end=1.0, step=1.0 / _SLIDER_STEP_COUNT, show_value=False, width=145,
+            value=limits.convert_value_to_position(value or 0.0), tooltips=False,
         )  # fmt: skip
         step = 10.0 ** math.floor(math.log10(max(abs(limits.low), abs(limits.high)))) / 100.0
         self._box = pn.widgets.FloatInput(
             label=unit or " ", value=value, width=95, step=step, description=meaning or None
         )
-        self._slider.param.watch(self._slider_moved, "value")
-        self._box.param.watch(self._box_changed, "value")
+        self._slider.param.watch(self._update_box_from_slider, "value")
+        self._box.param.watch(self._update_slider_from_box, "value")
         self.row = pn.Row(self._slider, self._box, margin=0)
 
-    def _slider_moved(self, event: Any) -> None:
+    def _update_box_from_slider(self, event: Any) -> None:
         """Write the value of the slider to the box."""
         if not self._is_moved_by_code:
-            self._set(self._box, self._limits.value_at(event.new))
+            self._set_value_without_callback(
+                self._box, self._limits.convert_position_to_value(event.new)
+            )
             self._changed(self._box.value)
 
-    def _box_changed(self, event: Any) -> None:
+    def _update_slider_from_box(self, event: Any) -> None:
         """Move the slider to the value in the box."""
         if not self._is_moved_by_code:
-            self._set(self._slider, self._limits.position_of(event.new or 0.0))
+            self._set_value_without_callback(
+                self._slider, self._limits.convert_value_to_position(event.new or 0.0)
+            )
             self._changed(event.new)
 
-    def _set(self, widget: Any, value: float) -> None:
+    def _set_value_without_callback(self, widget: Any, value: float) -> None:
         """Set the value of a widget without calling the function ``changed``."""
         self._is_moved_by_code = True
         try:

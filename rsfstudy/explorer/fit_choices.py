@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.api import DEFAULT_FREE_PARAMETERS, STIFFNESS_FROM_RECORD
+from rsfstudy.api import DEFAULT_FREE_PARAMETERS, STIFFNESS_OPTION_FROM_RECORD
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import LoadingStep, Record, parameters_of_law
 from rsfstudy.rig import read_record
@@ -22,9 +22,9 @@ from rsfstudy.slider import Scene
 
 #: An excluded time belongs to the nearest step of the window if the distance in time is at most
 #: this fraction of the shortest interval between two steps.
-_MAX_STEP_SHIFT_OVER_INTERVAL = 0.25
+_MAX_TIME_MISMATCH_OVER_STEP_INTERVAL = 0.25
 #: Options of the command ``fit`` whose names differ from the keywords of the functions.
-_OPTION_BY_KEYWORD = {"laws": "--law", "steps": "--step"}
+_COMMAND_OPTION_BY_KEYWORD = {"laws": "--law", "steps": "--step"}
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class FitChoices:
     together: bool = False
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> FitChoices:
+    def from_widget_state(cls, widget_state: Mapping[str, Any]) -> FitChoices:
         """Create the choices from the values of a saved state.
 
         Parameters
@@ -93,15 +93,15 @@ class FitChoices:
             If a name is unknown.
         """
         known = [field.name for field in fields(cls)]
-        for name in state:
+        for name in widget_state:
             if name not in known:
                 raise InvalidValue("state", name, "is not a choice of this view", choices=known)
         values: dict[str, Any] = {
-            name: tuple(v) if isinstance(v, list) else v for name, v in state.items()
+            name: tuple(v) if isinstance(v, list) else v for name, v in widget_state.items()
         }
         return cls(**values)
 
-    def reading_arguments(self) -> dict[str, Any]:
+    def build_read_record_arguments(self) -> dict[str, Any]:
         """Return the keyword arguments of ``rsfstudy.read_record`` for the whole record.
 
         Returns
@@ -116,14 +116,14 @@ class FitChoices:
         """
         found: dict[str, Any] = {}
         if self.columns.strip():
-            found["columns"] = parse_columns(self.columns)
+            found["columns"] = parse_column_headings(self.columns)
         if self.decimal != ".":
             found["decimal"] = self.decimal
         if self.normal_stress:
             found["normal_stress"] = self.normal_stress
         return found
 
-    def add_stiffness_for_slip(self, reading_arguments: dict[str, Any]) -> dict[str, Any]:
+    def add_stiffness_for_slip_record(self, reading_arguments: dict[str, Any]) -> dict[str, Any]:
         """Add the stiffness, which is required for a record of slip.
 
         Parameters
@@ -136,10 +136,10 @@ class FitChoices:
         dict of str to object
             Arguments with the stiffness, if the user entered a stiffness.
         """
-        has_value = self.stiffness and self.stiffness != STIFFNESS_FROM_RECORD
+        has_value = self.stiffness and self.stiffness != STIFFNESS_OPTION_FROM_RECORD
         return reading_arguments | ({"stiffness": self.stiffness} if has_value else {})
 
-    def window_arguments(self) -> dict[str, Any]:
+    def build_window_limit_arguments(self) -> dict[str, Any]:
         """Return the keyword arguments of ``rsfstudy.read_record`` for the window.
 
         Returns
@@ -150,7 +150,7 @@ class FitChoices:
         limits = {"begin": self.begin, "end": self.end}
         return {name: f"{at:.12g} s" for name, at in limits.items() if at is not None}
 
-    def select_window(self, record: Record) -> Record:
+    def cut_window_from(self, record: Record) -> Record:
         """Return the portion of a record that lies in the window.
 
         Parameters
@@ -169,10 +169,10 @@ class FitChoices:
         InvalidValue
             If the window contains no rows.
         """
-        limits = self.window_arguments()
+        limits = self.build_window_limit_arguments()
         return read_record(record, **limits) if limits else record
 
-    def find_step(self, steps: Sequence[LoadingStep], time: float) -> int | None:
+    def find_step_number(self, steps: Sequence[LoadingStep], excluded_time: float) -> int | None:
         """Return the number of the step at a time that the user has excluded.
 
         Parameters
@@ -189,14 +189,18 @@ class FitChoices:
             the window, or if no step is close to the time.
         """
         begin, end = self.begin, self.end
-        if not steps or (begin is not None and time < begin) or (end is not None and time > end):
+        if (
+            not steps
+            or (begin is not None and excluded_time < begin)
+            or (end is not None and excluded_time > end)
+        ):
             return None
         starts = np.array([step.start for step in steps])
-        nearest = int(np.abs(starts - time).argmin())
-        reach = _MAX_STEP_SHIFT_OVER_INTERVAL * np.diff(starts).min(initial=np.inf)
-        return nearest + 1 if abs(starts[nearest] - time) <= reach else None
+        nearest = int(np.abs(starts - excluded_time).argmin())
+        reach = _MAX_TIME_MISMATCH_OVER_STEP_INTERVAL * np.diff(starts).min(initial=np.inf)
+        return nearest + 1 if abs(starts[nearest] - excluded_time) <= reach else None
 
-    def find_excluded_steps(self, steps: Sequence[LoadingStep]) -> list[int]:
+    def find_excluded_step_numbers(self, steps: Sequence[LoadingStep]) -> list[int]:
         """Return the numbers of the steps that the user excluded.
 
         Parameters
@@ -209,9 +213,11 @@ class FitChoices:
         list of int
             Numbers of the excluded steps, starting from 1.
         """
-        return sorted({n for t in self.excluded if (n := self.find_step(steps, t)) is not None})
+        return sorted(
+            {n for t in self.excluded if (n := self.find_step_number(steps, t)) is not None}
+        )
 
-    def fit_arguments(self, steps: Sequence[LoadingStep]) -> dict[str, Any]:
+    def build_fit_arguments(self, steps: Sequence[LoadingStep]) -> dict[str, Any]:
         """Return the keyword arguments of ``rsfstudy.fit``.
 
         Parameters
@@ -231,7 +237,7 @@ class FitChoices:
         """
         if not self.laws:
             raise InvalidValue("laws", [], "must contain a law", remedy="Select at least one law.")
-        excluded = self.find_excluded_steps(steps)
+        excluded = self.find_excluded_step_numbers(steps)
         chosen = [number for number in range(1, len(steps) + 1) if number not in excluded]
         if steps and not chosen:
             remedy = "Include a step: click its mark, or tick its box."
@@ -239,7 +245,7 @@ class FitChoices:
         found: dict[str, Any] = {"laws": [*self.laws]}
         if excluded:
             found["steps"] = chosen
-        if free := self._free_parameters():
+        if free := self._list_free_parameters():
             found["free"] = free
         defaults = FitChoices()
         for name in (
@@ -249,7 +255,7 @@ class FitChoices:
                 found[name] = value
         return found
 
-    def _free_parameters(self) -> list[str]:
+    def _list_free_parameters(self) -> list[str]:
         """Return the free parameters, or an empty list for the default parameters."""
         if self.trend_degree == 1 and not self.more_free:
             return []
@@ -261,7 +267,7 @@ class FitChoices:
         return [name for name in names if name in requested or any(name in each for each in own)]
 
 
-def parse_columns(text: str) -> dict[str, str]:
+def parse_column_headings(heading_assignments: str) -> dict[str, str]:
     """Parse the headings of columns.
 
     Parameters
@@ -280,7 +286,7 @@ def parse_columns(text: str) -> dict[str, str]:
         If an assignment has no equals sign.
     """
     found = {}
-    for part in filter(str.strip, text.split(",")):
+    for part in filter(str.strip, heading_assignments.split(",")):
         name, equals, heading = (piece.strip() for piece in part.partition("="))
         if not (name and equals and heading):
             rule = "must read NAME=HEADING, as in 'time=t (s), friction=mu'"
@@ -306,7 +312,7 @@ def format_fit_command(path: str, arguments: Mapping[str, Any]) -> str:
     """
     words = ["rsfstudy", "fit", path]
     for name, value in arguments.items():
-        option = _OPTION_BY_KEYWORD.get(name, f"--{name.replace('_', '-')}")
+        option = _COMMAND_OPTION_BY_KEYWORD.get(name, f"--{name.replace('_', '-')}")
         if isinstance(value, bool):
             words += [option] * value
         elif isinstance(value, Mapping):

@@ -15,15 +15,15 @@ import panel as pn
 from rsfstudy.errors import RsfStudyWarning
 
 #: Function with which a computation reports its progress: a fraction from 0 to 1, and a text.
-Report = Callable[[float, str], None]
+ReportProgressFunction = Callable[[float, str], None]
 
 
 #: Time in s after which the progress bar of a computation becomes visible.
-DELAY = 0.4
-_COLLECTED = threading.local()
+PROGRESS_BAR_DELAY_SECONDS = 0.4
+_WARNINGS_OF_THREAD = threading.local()
 
 
-def route_warnings_to_pages() -> None:
+def redirect_warnings_to_browser_page() -> None:
     """Send warnings to ``collected_warnings`` instead of the terminal.
 
     The server calls this function once. In a notebook, the function is not called, and warnings are
@@ -32,8 +32,8 @@ def route_warnings_to_pages() -> None:
     print_warning = warnings.showwarning
 
     def show(message: Warning | str, *place: Any, **options: Any) -> None:
-        if isinstance(message, RsfStudyWarning) and hasattr(_COLLECTED, "messages"):
-            _COLLECTED.messages.append(str(message))
+        if isinstance(message, RsfStudyWarning) and hasattr(_WARNINGS_OF_THREAD, "messages"):
+            _WARNINGS_OF_THREAD.messages.append(str(message))
         else:
             print_warning(message, *place, **options)
 
@@ -42,7 +42,7 @@ def route_warnings_to_pages() -> None:
 
 
 @contextmanager
-def collected_warnings() -> Iterator[list[str]]:
+def collect_warnings_of_thread() -> Iterator[list[str]]:
     """Collect the warnings that this thread issues during a ``with`` block.
 
     Yields
@@ -50,14 +50,14 @@ def collected_warnings() -> Iterator[list[str]]:
     list of str
         Messages, if the server has called ``route_warnings_to_pages``.
     """
-    _COLLECTED.messages = []
+    _WARNINGS_OF_THREAD.messages = []
     try:
-        yield _COLLECTED.messages
+        yield _WARNINGS_OF_THREAD.messages
     finally:
-        del _COLLECTED.messages
+        del _WARNINGS_OF_THREAD.messages
 
 
-class Cancelled(KeyboardInterrupt):
+class JobCancelled(KeyboardInterrupt):
     """Raised in the thread of a computation when the user cancels the computation.
 
     The class is a subclass of ``KeyboardInterrupt``, because studies and fits record every other
@@ -66,17 +66,17 @@ class Cancelled(KeyboardInterrupt):
     """
 
 
-class _Job(NamedTuple):
+class _BackgroundJob(NamedTuple):
     """Waiting computation, with the callbacks that receive its outcome."""
 
-    label: str
-    compute: Callable[[Report], Any]
-    deliver: Callable[[Any], None]
-    fail: Callable[[Exception], None]
-    document: Any
+    progress_label: str
+    compute: Callable[[ReportProgressFunction], Any]
+    on_result: Callable[[Any], None]
+    on_error: Callable[[Exception], None]
+    bokeh_document: Any
 
 
-class Jobs:
+class BackgroundJobs:
     """Runner that executes the computations of a view in a thread, one at a time.
 
     If a computation is started while another computation is running, the new computation waits. The
@@ -105,12 +105,12 @@ class Jobs:
         )
         self._label = pn.pane.Str("", margin=(5, 5))
         self._button = pn.widgets.Button(label="Cancel", color="danger", width=90)
-        self._button.on_click(lambda _event: self.cancel())
+        self._button.on_click(lambda _event: self.cancel_all())
         self.indicator = pn.Row(self._label, self._bar, self._button, visible=False)
         self._lock = threading.Lock()
-        self._running: tuple[_Job, threading.Thread] | None = None
-        self._waiting: _Job | None = None
-        self._cancelled: _Job | None = None
+        self._running: tuple[_BackgroundJob, threading.Thread] | None = None
+        self._waiting: _BackgroundJob | None = None
+        self._cancelled: _BackgroundJob | None = None
 
     @property
     def is_running(self) -> bool:
@@ -119,9 +119,9 @@ class Jobs:
 
     def start(
         self,
-        compute: Callable[[Report], Any],
-        deliver: Callable[[Any], None],
-        fail: Callable[[Exception], None],
+        compute: Callable[[ReportProgressFunction], Any],
+        on_result: Callable[[Any], None],
+        on_error: Callable[[Exception], None],
         *,
         label: str = "",
     ) -> None:
@@ -139,18 +139,18 @@ class Jobs:
         label : str, optional
             Text next to the progress bar.
         """
-        job = _Job(label, compute, deliver, fail, pn.state.curdoc)
-        pn.state.onload(partial(self._enqueue, job))
+        job = _BackgroundJob(label, compute, on_result, on_error, pn.state.curdoc)
+        pn.state.onload(partial(self._start_or_queue, job))
 
-    def _enqueue(self, job: _Job) -> None:
+    def _start_or_queue(self, job: _BackgroundJob) -> None:
         """Start a job, or keep it waiting if another job is running."""
         with self._lock:
             if self._running is not None:
                 self._waiting = job
                 return
-            self._launch(job)
+            self._start_thread(job)
 
-    def cancel(self) -> None:
+    def cancel_all(self) -> None:
         """Cancel the running computation, and discard a waiting computation."""
         with self._lock:
             self._waiting = None
@@ -159,51 +159,60 @@ class Jobs:
             self._cancelled, thread = self._running
             if thread.ident is not None:
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                    ctypes.c_ulong(thread.ident), ctypes.py_object(Cancelled)
+                    ctypes.c_ulong(thread.ident), ctypes.py_object(JobCancelled)
                 )
 
-    def _launch(self, job: _Job) -> None:
+    def _start_thread(self, job: _BackgroundJob) -> None:
         """Start the thread of a job, and show the progress bar if the job takes long."""
-        thread = threading.Thread(target=self._work, args=(job,), daemon=True)
+        thread = threading.Thread(target=self._run_job, args=(job,), daemon=True)
         self._running = job, thread
-        timer = threading.Timer(DELAY, _call_in_document, (job, partial(self._show, job)))
+        timer = threading.Timer(
+            PROGRESS_BAR_DELAY_SECONDS,
+            _call_in_page_thread,
+            (job, partial(self._show_progress_bar_if_running, job)),
+        )
         timer.daemon = True
         thread.start()
         timer.start()
 
-    def _work(self, job: _Job) -> None:
+    def _run_job(self, job: _BackgroundJob) -> None:
         """Compute the result of a job, and deliver the result to the page."""
         outcome: Callable[[], None] | None = None
-        with collected_warnings() as messages:
+        with collect_warnings_of_thread() as messages:
             try:
-                outcome = partial(job.deliver, job.compute(partial(self._report, job)))
+                outcome = partial(
+                    job.on_result, job.compute(partial(self._update_progress_bar, job))
+                )
             except Exception as error:
-                outcome = partial(job.fail, error)
-            except Cancelled:
+                outcome = partial(job.on_error, error)
+            except JobCancelled:
                 pass
         with self._lock:
             if job is self._cancelled:  # A run converts the exception to another exception.
                 outcome = None
             successor, self._waiting, self._running = self._waiting, None, None
             if successor is not None:
-                self._launch(successor)
+                self._start_thread(successor)
         if successor is None:
-            _call_in_document(job, partial(self._finish, job, outcome, messages))
+            _call_in_page_thread(job, partial(self._finish_job, job, outcome, messages))
 
-    def _finish(
-        self, job: _Job, outcome: Callable[[], None] | None, messages: Sequence[str]
+    def _finish_job(
+        self,
+        job: _BackgroundJob,
+        deliver_outcome: Callable[[], None] | None,
+        warning_messages: Sequence[str],
     ) -> None:
         """Hide the progress bar, and deliver the outcome of a job."""
         if self._running is None:
             self.indicator.visible = False
-        if outcome is not None:
-            self._warn(messages)
+        if deliver_outcome is not None:
+            self._warn(warning_messages)
             try:
-                outcome()
+                deliver_outcome()
             except Exception as error:
-                job.fail(error)
+                job.on_error(error)
 
-    def _report(self, job: _Job, fraction: float, text: str = "") -> None:
+    def _update_progress_bar(self, job: _BackgroundJob, fraction: float, text: str = "") -> None:
         """Move the progress bar."""
 
         def move() -> None:
@@ -211,19 +220,19 @@ class Jobs:
             if text:
                 self._label.object = text
 
-        _call_in_document(job, move)
+        _call_in_page_thread(job, move)
 
-    def _show(self, job: _Job) -> None:
+    def _show_progress_bar_if_running(self, job: _BackgroundJob) -> None:
         """Show the progress bar if the job is still running."""
         if self._running is not None and self._running[0] is job:
             if not self.indicator.visible:
-                self._bar.value, self._label.object = -1, job.label
+                self._bar.value, self._label.object = -1, job.progress_label
             self.indicator.visible = True
 
 
-def _call_in_document(job: _Job, function: Callable[[], None]) -> None:
+def _call_in_page_thread(job: _BackgroundJob, function: Callable[[], None]) -> None:
     """Call a function in the thread of the page, or immediately if there is no page."""
-    if job.document is None or not job.document.session_context:
+    if job.bokeh_document is None or not job.bokeh_document.session_context:
         function()
     else:
-        job.document.add_next_tick_callback(function)
+        job.bokeh_document.add_next_tick_callback(function)

@@ -11,7 +11,7 @@ from rsfstudy.error_boundary import format_exception
 from rsfstudy.errors import RsfStudyError
 
 
-def create_message(error: Exception) -> Any:
+def create_error_page(error: Exception) -> Any:
     """Return a page with an error message, for display instead of a view.
 
     Parameters
@@ -24,10 +24,10 @@ def create_message(error: Exception) -> Any:
     panel.pane.Alert
         Page.
     """
-    return pn.pane.Alert(format_message(error), alert_type="danger")
+    return pn.pane.Alert(format_error_as_markdown(error), alert_type="danger")
 
 
-def format_message(error: Exception) -> str:
+def format_error_as_markdown(error: Exception) -> str:
     """Return the message of an error as Markdown, and log an unexpected error.
 
     Parameters

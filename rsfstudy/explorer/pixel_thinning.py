@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 
-def thin_to_pixels(
-    x: np.ndarray, y: np.ndarray, limits: tuple[float, float], pixel_count: int
+def thin_curve_to_pixels(
+    x: np.ndarray, y: np.ndarray, x_limits: tuple[float, float], pixel_count: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reduce a curve to the minimum and the maximum in each pixel.
 
@@ -35,12 +35,15 @@ def thin_to_pixels(
         per pixel that is not empty.
     """
     ordered = np.maximum.accumulate(x)
-    first, last = np.searchsorted(ordered, limits[0]), np.searchsorted(ordered, limits[1], "right")
+    first, last = (
+        np.searchsorted(ordered, x_limits[0]),
+        np.searchsorted(ordered, x_limits[1], "right"),
+    )
     rows = slice(max(int(first) - 1, 0), min(int(last) + 1, len(x)))
     x, y, ordered = x[rows], y[rows], ordered[rows]
     if len(x) <= 2 * pixel_count:
         return x, y
-    edges = np.searchsorted(ordered, np.linspace(*limits, pixel_count + 1)[1:-1])
+    edges = np.searchsorted(ordered, np.linspace(*x_limits, pixel_count + 1)[1:-1])
     starts = np.unique(np.concatenate([[0], edges[edges < len(x)]]))
     ends = np.append(starts[1:], len(x)) - 1
     lowest, highest = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)

@@ -10,7 +10,7 @@ from rsfstudy.explorer.fit_choices import FitChoices
 from rsfstudy.fitting import LoadingStep
 
 #: Laws that the record view offers. The other laws need parameters that a fit does not determine.
-_LAWS = (
+_OFFERED_LAWS = (
     "slip",
     "slowness",
     "perrin_rice_zheng",
@@ -19,20 +19,25 @@ _LAWS = (
     "two_slowness_states",
 )
 #: Parameters that can be fitted in addition to the default parameters.
-_MORE_PARAMETERS = {
+_ADDITIONAL_FIT_PARAMETER_BY_LABEL = {
     "stiffness k": "stiffness",
     "time of the step": "step_time",
     "alpha (normal stress steps)": "alpha",
     "exponent of the law family": "law_exponent",
 }
-_TREND_DEGREES = {"none": 0, "linear": 1, "quadratic": 2}
-_NOISE_MODELS = {"autoregressive, automatic order": "ar", "AR(1)": "ar1", "AR(2)": "ar2"} | {
-    "white": "white"
+_TREND_DEGREE_BY_LABEL = {"none": 0, "linear": 1, "quadratic": 2}
+_NOISE_MODEL_BY_LABEL = {
+    "autoregressive, automatic order": "ar",
+    "AR(1)": "ar1",
+    "AR(2)": "ar2",
+} | {"white": "white"}
+_LOADING_OPTION_BY_LABEL = {
+    "constant velocities between steps": "steps",
+    "recorded displacement": "recorded",
 }
-_LOADINGS = {"constant velocities between steps": "steps", "recorded displacement": "recorded"}
 
 
-def create_choice_widgets() -> dict[str, Any]:
+def create_fit_choice_widgets() -> dict[str, Any]:
     """Create the widgets of the choices.
 
     Returns
@@ -44,34 +49,43 @@ def create_choice_widgets() -> dict[str, Any]:
     half = {"width": 125, "format": "0.[000000]"}
     wide = {"sizing_mode": "stretch_width"}
     return {
-        "columns": _text("Columns", "time=t (s), friction=mu"),
+        "columns": _create_text_input("Columns", "time=t (s), friction=mu"),
         "decimal": kinds.Select(label="Decimal separator", options=[".", ","], **wide),
-        "normal_stress": _text("Normal stress, if not in the file", "20 MPa"),
+        "normal_stress": _create_text_input("Normal stress, if not in the file", "20 MPa"),
         "begin": kinds.FloatInput(label="Begin (s)", value=None, **half),
         "end": kinds.FloatInput(label="End (s)", value=None, **half),
-        "laws": kinds.MultiChoice(label="Laws", options=[*_LAWS], value=[*default.laws], **wide),
-        "stiffness": _text("Stiffness", "0.04 MPa/um, 2e-3 1/um or from record"),
+        "laws": kinds.MultiChoice(
+            label="Laws", options=[*_OFFERED_LAWS], value=[*default.laws], **wide
+        ),
+        "stiffness": _create_text_input("Stiffness", "0.04 MPa/um, 2e-3 1/um or from record"),
         "trend_degree": kinds.Select(
-            label="Trend of friction", options=_TREND_DEGREES, value=default.trend_degree, **wide
+            label="Trend of friction",
+            options=_TREND_DEGREE_BY_LABEL,
+            value=default.trend_degree,
+            **wide,
         ),
-        "more_free": kinds.MultiChoice(label="Also fit", options=_MORE_PARAMETERS, **wide),
-        "slip_distance": _text("Initial guess of Dc", "10 um"),
-        "before": _text("Displacement before each step", "100 um"),
-        "after": _text("Displacement after each step", "200 um"),
+        "more_free": kinds.MultiChoice(
+            label="Also fit", options=_ADDITIONAL_FIT_PARAMETER_BY_LABEL, **wide
+        ),
+        "slip_distance": _create_text_input("Initial guess of Dc", "10 um"),
+        "before": _create_text_input("Displacement before each step", "100 um"),
+        "after": _create_text_input("Displacement after each step", "200 um"),
         "noise": kinds.Select(
-            label="Noise model", options=_NOISE_MODELS, value=default.noise, **wide
+            label="Noise model", options=_NOISE_MODEL_BY_LABEL, value=default.noise, **wide
         ),
-        "loading": kinds.Select(label="Loading", options=_LOADINGS, value=default.loading, **wide),
+        "loading": kinds.Select(
+            label="Loading", options=_LOADING_OPTION_BY_LABEL, value=default.loading, **wide
+        ),
         "together": kinds.Checkbox(label="Fit all steps jointly"),
     }
 
 
-def _text(name: str, example: str) -> Any:
+def _create_text_input(label: str, example: str) -> Any:
     """Create a text field with an example."""
-    return pn.widgets.TextInput(label=name, placeholder=example, sizing_mode="stretch_width")
+    return pn.widgets.TextInput(label=label, placeholder=example, sizing_mode="stretch_width")
 
 
-def format_step(number: int, step: LoadingStep) -> str:
+def describe_loading_step(step_number: int, step: LoadingStep) -> str:
     """Describe a step in one line.
 
     Parameters
@@ -86,7 +100,7 @@ def format_step(number: int, step: LoadingStep) -> str:
     str
         Number, time, velocities, and the normal stresses if the normal stress changes.
     """
-    text = f"{number}: {step.start:.6g} s, "
+    text = f"{step_number}: {step.start:.6g} s, "
     text += f"{step.velocity_before:.3g} to {step.velocity_after:.3g} µm/s"
     if step.stress_ratio != 1.0:
         text += f", {step.stress_before * 1e-6:.3g} to {step.stress_after * 1e-6:.3g} MPa"

@@ -15,18 +15,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from rsfstudy.explorer.result_selections import Selection, dimension_along_x
+from rsfstudy.explorer.result_selections import PlotSelection, find_dimension_along_x
 from rsfstudy.plots import are_log_spaced, compute_cell_edges, describe_point
 from rsfstudy.status import Status
 
 #: Maximum number of panels, of curves in a panel, and of points of a curve.
 MAX_PANELS, MAX_CURVES, MAX_POINTS = 12, 40, 4000
 #: Number of blocks along each axis in which the statuses of many cells are shown.
-_BLOCKS = 50
+_STATUS_BLOCKS_PER_AXIS = 50
 
 
 @dataclass(frozen=True)
-class Curve:
+class CurveData:
     """Numbers of one curve.
 
     Parameters
@@ -44,17 +44,17 @@ class Curve:
         Numbers of the cells in row-major order, or -1 if a point belongs to no cell.
     """
 
-    name: str
-    number: int
+    label: str
+    point_index: int
     x: np.ndarray
     y: np.ndarray
-    error: np.ndarray
-    status: np.ndarray
-    cells: np.ndarray
+    y_error: np.ndarray
+    status_codes: np.ndarray
+    cell_numbers: np.ndarray
 
 
 @dataclass(frozen=True)
-class Map:
+class MapData:
     """Numbers of one map.
 
     Parameters
@@ -70,10 +70,10 @@ class Map:
     x: np.ndarray
     y: np.ndarray
     values: np.ndarray
-    status: np.ndarray
-    cells: np.ndarray
+    status_codes: np.ndarray
+    cell_numbers: np.ndarray
 
-    def cell_at(self, x: float, y: float) -> int:
+    def find_cell_number_at(self, x: float, y: float) -> int:
         """Return the number of the cell at a position, or -1 outside the map."""
         at = []
         for points, value in ((self.y, y), (self.x, x)):
@@ -81,35 +81,37 @@ class Map:
             at.append(int(np.searchsorted(edges, value, side="right")) - 1)
             if not edges[0] <= value <= edges[-1]:
                 return -1
-        return int(self.cells[min(at[0], self.y.size - 1), min(at[1], self.x.size - 1)])
+        return int(self.cell_numbers[min(at[0], self.y.size - 1), min(at[1], self.x.size - 1)])
 
 
-def error_name(dataset: xr.Dataset, variable: str) -> str:
+def find_error_variable_name(dataset: xr.Dataset, variable_name: str) -> str:
     """Return the name of the error estimate of a variable, or an empty string."""
-    names = (f"{variable}_stderr", f"{variable}_error")
+    names = (f"{variable_name}_stderr", f"{variable_name}_error")
     return next(
-        (n for n in names if n in dataset and dataset[n].dims == dataset[variable].dims), ""
+        (n for n in names if n in dataset and dataset[n].dims == dataset[variable_name].dims), ""
     )
 
 
-def part_names(dataset: xr.Dataset, selection: Selection) -> list[str]:
+def list_shown_variable_names(dataset: xr.Dataset, selection: PlotSelection) -> list[str]:
     """Return the names of the variables displayed by a selection.
 
     The list contains the plotted variable, its error estimate, the variable on the x axis, the
     status and the message.
     """
-    names = [selection.variable, error_name(dataset, selection.variable), selection.x]
-    if shows_cells(dataset, selection.variable):
+    names = [selection.variable, find_error_variable_name(dataset, selection.variable), selection.x]
+    if has_one_value_per_cell(dataset, selection.variable):
         names += ["status", "message"]
     return [n for n in dict.fromkeys(names) if n in dataset.data_vars]
 
 
-def shows_cells(dataset: xr.Dataset, variable: str) -> bool:
+def has_one_value_per_cell(dataset: xr.Dataset, variable_name: str) -> bool:
     """Return True if a variable has exactly one value per cell."""
-    return {*dataset["status"].dims} <= {*dataset[variable].dims}
+    return {*dataset["status"].dims} <= {*dataset[variable_name].dims}
 
 
-def iterate_panels(dataset: xr.Dataset, selection: Selection) -> Iterator[Selection]:
+def iterate_panel_selections(
+    dataset: xr.Dataset, selection: PlotSelection
+) -> Iterator[PlotSelection]:
     """Yield one selection per panel, with a fixed point of the facet dimension.
 
     At most 12 evenly spaced points of the facet dimension are used.
@@ -117,33 +119,33 @@ def iterate_panels(dataset: xr.Dataset, selection: Selection) -> Iterator[Select
     if not selection.facet:
         yield selection
         return
-    for place in thin_points(dataset.sizes[selection.facet], MAX_PANELS):
+    for place in choose_evenly_spaced_indices(dataset.sizes[selection.facet], MAX_PANELS):
         points = {**selection.points, selection.facet: int(place)}
-        yield Selection(
+        yield PlotSelection(
             selection.variable, selection.kind, selection.x, selection.second, "", points
         )
 
 
-def thin_points(size: int, most: int) -> np.ndarray:
+def choose_evenly_spaced_indices(size: int, max_count: int) -> np.ndarray:
     """Return indices at regular intervals, including the first and the last index."""
-    return np.unique(np.linspace(0, size - 1, min(size, most)).round().astype(int))
+    return np.unique(np.linspace(0, size - 1, min(size, max_count)).round().astype(int))
 
 
-def describe_points(dataset: xr.Dataset, points: Mapping[str, int]) -> str:
+def describe_selected_points(dataset: xr.Dataset, point_indices: Mapping[str, int]) -> str:
     """Describe the selected points of several dimensions as a mathtext label."""
-    varied = [d for d in points if dataset.sizes[d] > 1]
+    varied = [d for d in point_indices if dataset.sizes[d] > 1]
     return ", ".join(
-        describe_point(dataset.coords.to_dataset().isel({d: points[d]}), d) for d in varied
+        describe_point(dataset.coords.to_dataset().isel({d: point_indices[d]}), d) for d in varied
     )
 
 
-def _arrays_of_panel(
-    dataset: xr.Dataset, panel: Selection, dimensions: Sequence[str]
+def _extract_panel_arrays(
+    dataset: xr.Dataset, panel: PlotSelection, dimensions: Sequence[str]
 ) -> tuple[np.ndarray, ...]:
     """Return the values, errors, statuses and cell numbers shown in a panel."""
-    lattice, error = dataset["status"], error_name(dataset, panel.variable)
+    lattice, error = dataset["status"], find_error_variable_name(dataset, panel.variable)
     status, cells = xr.DataArray(int(Status.OK)), xr.DataArray(-1)
-    if shows_cells(dataset, panel.variable):
+    if has_one_value_per_cell(dataset, panel.variable):
         status = lattice.isel({d: i for d, i in panel.points.items() if d in lattice.dims})
         cells, stride = xr.DataArray(0), 1
         for name in map(str, reversed(lattice.dims)):
@@ -164,7 +166,7 @@ def _arrays_of_panel(
     return values.values.astype(float), *(one.values for one in rest)
 
 
-def curves_of_panel(dataset: xr.Dataset, panel: Selection) -> list[Curve]:
+def extract_curves_of_panel(dataset: xr.Dataset, panel: PlotSelection) -> list[CurveData]:
     """Return the curves of a single panel.
 
     If a panel has more than 40 curves, only a regularly spaced subset of the curves is returned. A
@@ -183,33 +185,39 @@ def curves_of_panel(dataset: xr.Dataset, panel: Selection) -> list[Curve]:
     list of Curve
         One curve per selected point of the colour dimension.
     """
-    along, second = dimension_along_x(dataset, panel.variable, panel.x), panel.second
+    along, second = find_dimension_along_x(dataset, panel.variable, panel.x), panel.second
     dims = ([second] if second else []) + [along]
-    arrays = [a.reshape(-1, a.shape[-1]) for a in _arrays_of_panel(dataset, panel, dims)]
-    x = _x_values(dataset, panel, along, arrays[0].shape)
+    arrays = [a.reshape(-1, a.shape[-1]) for a in _extract_panel_arrays(dataset, panel, dims)]
+    x = _broadcast_x_values(dataset, panel, along, arrays[0].shape)
     found = []
-    for number in thin_points(len(arrays[0]), MAX_CURVES):
+    for number in choose_evenly_spaced_indices(len(arrays[0]), MAX_CURVES):
         values, errors, status, cells = (a[number] for a in arrays)
-        name = to_plain_text(describe_points(dataset, {second: int(number)})) if second else ""
-        kept = thin_curve(values, status)
+        name = (
+            convert_mathtext_to_unicode(describe_selected_points(dataset, {second: int(number)}))
+            if second
+            else ""
+        )
+        kept = choose_drawn_point_indices(values, status)
         rows = (x[number], values, errors, status, cells)
-        found.append(Curve(name, int(number), *(row[kept] for row in rows)))
+        found.append(CurveData(name, int(number), *(row[kept] for row in rows)))
     return found
 
 
-def _x_values(
-    dataset: xr.Dataset, panel: Selection, along: str, shape: tuple[int, ...]
+def _broadcast_x_values(
+    dataset: xr.Dataset, panel: PlotSelection, x_dimension: str, shape: tuple[int, ...]
 ) -> np.ndarray:
     """Return the values along x of all curves. Names are numbered from 0."""
-    values = dataset[panel.x] if panel.x in dataset.variables else dataset[along]
+    values = dataset[panel.x] if panel.x in dataset.variables else dataset[x_dimension]
     if values.dtype.kind not in "iuf":
         return np.broadcast_to(np.arange(shape[-1], dtype=float), shape)
     at = {d: i for d, i in panel.points.items() if d in values.dims}
-    dims = [d for d in (panel.second, along) if d in values.dims]
+    dims = [d for d in (panel.second, x_dimension) if d in values.dims]
     return np.broadcast_to(values.isel(at).transpose(*dims).values.astype(float), shape)
 
 
-def thin_curve(values: np.ndarray, status: np.ndarray | None = None) -> np.ndarray:
+def choose_drawn_point_indices(
+    values: np.ndarray, status_codes: np.ndarray | None = None
+) -> np.ndarray:
     """Return the indices of the curve points that are drawn.
 
     Parameters
@@ -233,12 +241,12 @@ def thin_curve(values: np.ndarray, status: np.ndarray | None = None) -> np.ndarr
     kept = [0, values.size - 1]
     for start, end in zip(starts, [*starts[1:], values.size], strict=True):
         kept += [start + int(low[start:end].argmin()), start + int(high[start:end].argmax())]
-        if status is not None:
-            kept.append(start + int((status[start:end] != int(Status.OK)).argmax()))
+        if status_codes is not None:
+            kept.append(start + int((status_codes[start:end] != int(Status.OK)).argmax()))
     return np.unique(kept)
 
 
-def map_of_panel(dataset: xr.Dataset, panel: Selection) -> Map:
+def extract_map_of_panel(dataset: xr.Dataset, panel: PlotSelection) -> MapData:
     """Return the map of a single panel.
 
     Parameters
@@ -256,12 +264,15 @@ def map_of_panel(dataset: xr.Dataset, panel: Selection) -> Map:
     dims = (panel.second, panel.x)
     y, x = (dataset[d].values.astype(float) for d in dims)
     order = np.ix_(np.argsort(y), np.argsort(x))
-    values, _errors, status, cells = (a[order] for a in _arrays_of_panel(dataset, panel, dims))
-    return Map(np.sort(x), np.sort(y), values, status, cells)
+    values, _errors, status, cells = (a[order] for a in _extract_panel_arrays(dataset, panel, dims))
+    return MapData(np.sort(x), np.sort(y), values, status, cells)
 
 
-def sample_map(
-    found: Map, x_range: tuple[float, float], y_range: tuple[float, float], shape: tuple[int, int]
+def sample_map_at_pixels(
+    map_data: MapData,
+    x_range: tuple[float, float],
+    y_range: tuple[float, float],
+    pixel_shape: tuple[int, int],
 ) -> np.ndarray:
     """Sample the values of a map at the pixels of an image.
 
@@ -282,16 +293,18 @@ def sample_map(
     """
     places = []
     limits = (y_range, x_range)
-    for points, (low, high), count in zip((found.y, found.x), limits, shape, strict=True):
+    for points, (low, high), count in zip(
+        (map_data.y, map_data.x), limits, pixel_shape, strict=True
+    ):
         edges, is_log = compute_cell_edges(points, log := are_log_spaced(points)), log
         low, high = (np.log(low), np.log(high)) if is_log else (low, high)
         pixels = low + (high - low) * (np.arange(count) + 0.5) / count
         pixels = np.exp(pixels) if is_log else pixels
         places.append(np.clip(np.searchsorted(edges, pixels, "right") - 1, 0, points.size - 1))
-    return found.values[np.ix_(*places)]
+    return map_data.values[np.ix_(*places)]
 
 
-class Marks(NamedTuple):
+class StatusMarks(NamedTuple):
     """Cells whose status is not "ok".
 
     Parameters
@@ -302,13 +315,13 @@ class Marks(NamedTuple):
         Status codes and cell numbers.
     """
 
-    rows: np.ndarray
-    columns: np.ndarray
-    status: np.ndarray
-    cells: np.ndarray
+    row_indices: np.ndarray
+    column_indices: np.ndarray
+    status_codes: np.ndarray
+    cell_numbers: np.ndarray
 
 
-def find_marks(status: np.ndarray, cells: np.ndarray) -> Marks:
+def find_cells_to_mark(status_codes: np.ndarray, cell_numbers: np.ndarray) -> StatusMarks:
     """Find the cells whose status is not "ok".
 
     If there are more than 2,500 such cells, the array is divided into 50 by 50 blocks, and one cell
@@ -325,40 +338,45 @@ def find_marks(status: np.ndarray, cells: np.ndarray) -> Marks:
     Marks
         Cells in row-major order.
     """
-    rows, columns = np.nonzero(status != int(Status.OK))
-    codes = status[rows, columns]
-    if rows.size > _BLOCKS**2:
+    rows, columns = np.nonzero(status_codes != int(Status.OK))
+    codes = status_codes[rows, columns]
+    if rows.size > _STATUS_BLOCKS_PER_AXIS**2:
         blocks = [
-            at * _BLOCKS // size for at, size in zip((rows, columns), status.shape, strict=True)
+            at * _STATUS_BLOCKS_PER_AXIS // size
+            for at, size in zip((rows, columns), status_codes.shape, strict=True)
         ]
-        keys = np.ravel_multi_index((*blocks, codes), (_BLOCKS, _BLOCKS, len(Status)))
+        keys = np.ravel_multi_index(
+            (*blocks, codes), (_STATUS_BLOCKS_PER_AXIS, _STATUS_BLOCKS_PER_AXIS, len(Status))
+        )
         kept = np.unique(keys, return_index=True)[1]
         rows, columns, codes = rows[kept], columns[kept], codes[kept]
-    return Marks(rows, columns, codes, cells[rows, columns])
+    return StatusMarks(rows, columns, codes, cell_numbers[rows, columns])
 
 
-def describe_status(code: int) -> str:
+def format_status_name(status_code: int) -> str:
     """Return the name of a status with spaces instead of underscores."""
-    return Status.labels_by_code()[code].replace("_", " ")
+    return Status.labels_by_code()[status_code].replace("_", " ")
 
 
-def to_plain_text(mathtext: str) -> str:
+def convert_mathtext_to_unicode(mathtext: str) -> str:
     """Convert a label in mathtext to Unicode characters, for legends and widgets."""
     text = mathtext.replace("\n", " ").replace(r"\,", " ").replace("$", "")
-    text = re.sub(r"\\([A-Za-z]+) ?", lambda found: _unescape_symbol(found[1]), text)
+    text = re.sub(
+        r"\\([A-Za-z]+) ?", lambda found: _convert_symbol_name_to_character(found[1]), text
+    )
     for mark, digits in ((r"\^", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"), ("_", "₀₁₂₃₄₅₆₇₈₉₋")):
         small = str.maketrans("0123456789-", digits)
-        text = re.sub(mark + r"\{?(-?\d+)\}?", partial(_translate_digits, small), text)
+        text = re.sub(mark + r"\{?(-?\d+)\}?", partial(_translate_matched_digits, small), text)
     return re.sub(r"[{}]", "", text).replace("\\ ", " ")
 
 
-def _translate_digits(digits: dict[int, int], found: re.Match[str]) -> str:
+def _translate_matched_digits(digit_table: dict[int, int], match: re.Match[str]) -> str:
     """Return the digits of a match as superscripts or subscripts."""
-    return found[1].translate(digits)
+    return match[1].translate(digit_table)
 
 
-def _unescape_symbol(name: str) -> str:
+def _convert_symbol_name_to_character(symbol_name: str) -> str:
     """Return the character of a symbol, or the name of an operator such as ``ln``."""
-    entity = f"&{name};"
+    entity = f"&{symbol_name};"
     character = html.unescape(entity)
-    return name if character == entity else character
+    return symbol_name if character == entity else character

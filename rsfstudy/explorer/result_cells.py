@@ -13,20 +13,20 @@ import xarray as xr
 from bokeh.plotting import figure
 
 from rsfstudy.api import recompute_cell, simulate
-from rsfstudy.explorer.result_arrays import thin_curve, to_plain_text
+from rsfstudy.explorer.result_arrays import choose_drawn_point_indices, convert_mathtext_to_unicode
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.plots import format_axis_label
 from rsfstudy.slider import Scene
 from rsfstudy.storage import StoredDataset
 
 #: Variables that can be along x in the plot of a motion. The first available variable is used.
-_ABSCISSAE = ("time", "load_point_displacement", "slip")
+_X_VARIABLES_OF_MOTION_PLOT = ("time", "load_point_displacement", "slip")
 #: Load of the motion if a measure solves for this load and has found no value.
-_LOAD_WITHOUT_VALUE = {
+_STEP_SIZE_IF_NO_CRITICAL_STEP = {
     "load_velocity_ratio": 2.0, "displacement_step": 1.0, "normal_stress_step": 0.1,
 }  # fmt: skip
 #: Load point velocity in V_* of the motion of a scene that has no step.
-_VELOCITY_WITHOUT_STEP = 1.01
+_VELOCITY_RATIO_IF_SCENE_HAS_NO_STEP = 1.01
 
 
 @dataclass(frozen=True)
@@ -49,15 +49,15 @@ class RecomputedCell:
         Python statement that computes the motion.
     """
 
-    number: int
+    cell_number: int
     scene: Scene
     outcome: Outcome
     motion: xr.Dataset
-    note: str
-    code: str
+    motion_explanation: str
+    motion_code: str
 
 
-def cell_coordinates(results: xr.Dataset, number: int) -> dict[str, Any]:
+def find_cell_coordinates(results: xr.Dataset, cell_number: int) -> dict[str, Any]:
     """Return the coordinates of a cell.
 
     Parameters
@@ -73,7 +73,7 @@ def cell_coordinates(results: xr.Dataset, number: int) -> dict[str, Any]:
         Value or label on each dimension of the lattice.
     """
     status = results["status"]
-    index = np.unravel_index(number, status.shape)
+    index = np.unravel_index(cell_number, status.shape)
     return {
         str(d): results[d].values[i].item()
         if results[d].dtype.kind != "O"
@@ -82,8 +82,8 @@ def cell_coordinates(results: xr.Dataset, number: int) -> dict[str, Any]:
     }
 
 
-def recompute(
-    results: xr.Dataset, number: int, report: Callable[[float, str], None]
+def recompute_cell_and_motion(
+    results: xr.Dataset, cell_number: int, report_progress: Callable[[float, str], None]
 ) -> RecomputedCell:
     """Compute the outcome and the motion of a cell again.
 
@@ -105,14 +105,14 @@ def recompute(
     RecomputedCell
         Scene, outcome and motion.
     """
-    coordinates, study = cell_coordinates(results, number), StoredDataset(results).study
-    report(0.1, "Computing the cell")
+    coordinates, study = find_cell_coordinates(results, cell_number), StoredDataset(results).study
+    report_progress(0.1, "Computing the cell")
     scene, outcome = recompute_cell(results, coordinates)
-    report(0.6, "Computing the motion")
-    motion, note, code = _recorded_motion(study.measure, scene, outcome)
+    report_progress(0.6, "Computing the motion")
+    motion, note, code = _extract_recorded_motion(study.measure, scene, outcome)
     if motion is None:
-        measure = study.measure.with_(**study.cell(number).measure_changes)
-        loading, note = _loading_of_motion(measure, scene, outcome)
+        measure = study.measure.with_(**study.cell(cell_number).measure_field_changes)
+        loading, note = _choose_loading_of_motion(measure, scene, outcome)
         moving = scene.with_(**{name: value for name, (value, _text) in loading.items()})
         options: dict[str, Any] = {"rtol": study.accuracy.rtol, "engine": study.accuracy.engine}
         motion = simulate(moving, **options)
@@ -120,16 +120,16 @@ def recompute(
         with_loading = f"scene.with_({arguments})" if arguments else "scene"
         texts = "".join(f", {name}={value!r}" for name, value in options.items())
         code = f"motion = rsfstudy.simulate({with_loading}{texts})"
-    return RecomputedCell(number, scene, outcome, motion, note, code)
+    return RecomputedCell(cell_number, scene, outcome, motion, note, code)
 
 
-def _recorded_motion(
+def _extract_recorded_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[xr.Dataset | None, str, str]:
     """Return the motion recorded by a measure, with an explanation and its code."""
     dims = measure.variables.get("log10_slip_rate", ())
     names = [n for n in outcome.values if measure.variables[n] == dims]
-    if len(dims) != 1 or not {*_ABSCISSAE} & {*names}:
+    if len(dims) != 1 or not {*_X_VARIABLES_OF_MOTION_PLOT} & {*names}:
         return None, "", ""
     columns = {name: (dims, np.asarray(outcome.values[name])) for name in names}
     attributes = {"scene": json.dumps(scene.describe()), "title": f"Motion of {measure.name}"}
@@ -138,11 +138,11 @@ def _recorded_motion(
     return xr.Dataset(columns, attrs=attributes), note, code
 
 
-def _loading_of_motion(
+def _choose_loading_of_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[dict[str, tuple[float, str]], str]:
     """Return the loading fields of a motion, their Python code, and an explanation."""
-    loads = [name for name in measure.solved_fields if name in _LOAD_WITHOUT_VALUE]
+    loads = [name for name in measure.solved_fields if name in _STEP_SIZE_IF_NO_CRITICAL_STEP]
     if loads:
         verified = f"{measure.primary_output}_unstable"
         value = float(outcome.values.get(verified, np.nan))
@@ -150,7 +150,7 @@ def _loading_of_motion(
             text = f'outcome.values["{verified}"]'
             note = "Motion after the step that the measure has verified as unstable."
         else:
-            value = _LOAD_WITHOUT_VALUE[loads[0]]
+            value = _STEP_SIZE_IF_NO_CRITICAL_STEP[loads[0]]
             text = repr(value)
             note = f"The measure found no critical step. Motion after {loads[0]} = {value:g}."
         loading = {loads[0]: (value, text)}
@@ -159,12 +159,14 @@ def _loading_of_motion(
         return loading, note
     if scene.is_perturbed:
         return {}, "Motion of the scene, simulated from its loading."
-    ratio = _VELOCITY_WITHOUT_STEP
+    ratio = _VELOCITY_RATIO_IF_SCENE_HAS_NO_STEP
     note = f"The scene has no step. Motion after a step of the load point velocity to {ratio} V_*."
     return {"load_velocity_ratio": (ratio, repr(ratio))}, note
 
 
-def tabulate_outcome(cell: RecomputedCell, results: xr.Dataset) -> pd.DataFrame:
+def tabulate_recomputed_outcome(
+    recomputed_cell: RecomputedCell, results: xr.Dataset
+) -> pd.DataFrame:
     """Return a table of the recomputed numbers, their errors and the stored values.
 
     Parameters
@@ -180,8 +182,8 @@ def tabulate_outcome(cell: RecomputedCell, results: xr.Dataset) -> pd.DataFrame:
         Table with one row per scalar result. The columns are ``result``, ``value``, ``error`` and
         ``stored``.
     """
-    stored = results.sel(cell_coordinates(results, cell.number))
-    values = {n: v for n, v in cell.outcome.values.items() if np.ndim(v) == 0}
+    stored = results.sel(find_cell_coordinates(results, recomputed_cell.cell_number))
+    values = {n: v for n, v in recomputed_cell.outcome.values.items() if np.ndim(v) == 0}
     rows = [
         {
             "result": name,
@@ -195,7 +197,7 @@ def tabulate_outcome(cell: RecomputedCell, results: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["result", "value", "error", "stored"])
 
 
-def motion_figures(motion: xr.Dataset, height: int = 240) -> list[Any]:
+def draw_motion_figures(motion: xr.Dataset, figure_height: int = 240) -> list[Any]:
     """Return Bokeh figures of stress and slip rate against displacement or time.
 
     If the slip rate of a motion without inertia and damping exceeds the instability norm, the
@@ -215,20 +217,20 @@ def motion_figures(motion: xr.Dataset, height: int = 240) -> list[Any]:
     """
     if "instability_time" in motion:
         motion = motion.sel(time=slice(None, float(motion["instability_time"])))
-    x = next(name for name in _ABSCISSAE if name in motion)
+    x = next(name for name in _X_VARIABLES_OF_MOTION_PLOT if name in motion)
     stress = "friction_coefficient" if "friction_coefficient" in motion else "shear_stress"
     drawn: list[Any] = []
     for y in (stress, "log10_slip_rate"):
-        kept = thin_curve(motion[y].values)
+        kept = choose_drawn_point_indices(motion[y].values)
         shared = {"x_range": drawn[0].x_range} if drawn else {}
         panel: Any = figure(
-            height=height, sizing_mode="stretch_width", toolbar_location="above",
+            height=figure_height, sizing_mode="stretch_width", toolbar_location="above",
             tools="pan,wheel_zoom,box_zoom,reset,hover", active_drag="box_zoom", **shared,
         )  # fmt: skip
         panel.line(motion[x].values[kept], motion[y].values[kept], line_width=1.6, color="#0072B2")
         for axis, name in ((panel.xaxis, x), (panel.yaxis, y)):
             axis.axis_label_text_font_size = "12px"
-            axis.axis_label = to_plain_text(format_axis_label(motion, name, 200))
+            axis.axis_label = convert_mathtext_to_unicode(format_axis_label(motion, name, 200))
         panel.axis.axis_label_text_font_style = "normal"
         drawn.append(panel)
     return drawn

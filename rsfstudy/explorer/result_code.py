@@ -8,18 +8,18 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.explorer.result_arrays import error_name, part_names
+from rsfstudy.explorer.result_arrays import find_error_variable_name, list_shown_variable_names
 from rsfstudy.explorer.result_cells import RecomputedCell
-from rsfstudy.explorer.result_selections import MAP, Selection
+from rsfstudy.explorer.result_selections import MAP, PlotSelection
 from rsfstudy.plots import Figure, draw_figure
 from rsfstudy.study import Figure as DeclaredFigure
 from rsfstudy.study import Panel
 
 #: Line of the code of results that were not read from a file.
-_RESULTS_WITHOUT_FILE = "# results is the dataset that you passed to rsfstudy.explore."
+_CODE_LINE_FOR_RESULTS_IN_MEMORY = "# results is the dataset that you passed to rsfstudy.explore."
 
 
-def draw_selection(dataset: xr.Dataset, selection: Selection) -> Figure:
+def draw_figure_of_selection(dataset: xr.Dataset, selection: PlotSelection) -> Figure:
     """Draw the figure of a selection with the functions of ``rsfstudy``.
 
     Parameters
@@ -37,26 +37,26 @@ def draw_selection(dataset: xr.Dataset, selection: Selection) -> Figure:
     if selection.kind == MAP:
         part = dataset.isel(dict(selection.points)).transpose(..., selection.second, selection.x)
         return draw_figure(part, variable=selection.variable)
-    panel = Panel(**_panel_options(dataset, selection))
+    panel = Panel(**_build_panel_arguments(dataset, selection))
     return draw_figure(dataset, DeclaredFigure([panel]))
 
 
-def _panel_options(dataset: xr.Dataset, selection: Selection) -> dict[str, Any]:
+def _build_panel_arguments(dataset: xr.Dataset, selection: PlotSelection) -> dict[str, Any]:
     """Return the arguments of ``rsfstudy.Panel`` for the curves of a selection."""
     options: dict[str, Any] = {"x": selection.x, "y": selection.variable}
     options |= {"hue": [selection.second]} if selection.second else {}
     options |= {"facet": [selection.facet]} if selection.facet else {}
     options |= {"isel": dict(selection.points)} if selection.points else {}
-    error = error_name(dataset, selection.variable)
+    error = find_error_variable_name(dataset, selection.variable)
     return options | ({"error_bars": error} if error else {}) | {"log": None}
 
 
-def write_python(
+def write_selection_as_python_code(
     dataset: xr.Dataset,
-    selection: Selection,
-    file: str,
-    cell: RecomputedCell | None,
-    cell_place: Mapping[str, Any] | None,
+    selection: PlotSelection,
+    results_path: str,
+    recomputed_cell: RecomputedCell | None,
+    cell_coordinates: Mapping[str, Any] | None,
 ) -> str:
     """Write Python code that prints the numbers of a selection and draws its figure.
 
@@ -79,12 +79,16 @@ def write_python(
         Python code.
     """
     lines = ["import rsfstudy", ""]
-    lines += [f"results = rsfstudy.open({file!r})"] if file else [_RESULTS_WITHOUT_FILE]
+    lines += (
+        [f"results = rsfstudy.open({results_path!r})"]
+        if results_path
+        else [_CODE_LINE_FOR_RESULTS_IN_MEMORY]
+    )
     shown = "results"
     if "sigma_star" in dataset.variables:
         shown = "shown"
         lines.append("shown = results.rsf.in_units()  # in MPa, um and s")
-    points, names = dict(selection.points), part_names(dataset, selection)
+    points, names = dict(selection.points), list_shown_variable_names(dataset, selection)
     lines.append(f"part = {shown}[{names!r}]{f'.isel({points!r})' if points else ''}")
     lines += ["print(part.to_dataframe())", ""]
     if selection.kind == MAP:
@@ -92,18 +96,23 @@ def write_python(
         selected = f"{shown}.isel({points!r})" if points else shown
         lines.append(f"figure = rsfstudy.plot({selected}.{plane}, {selection.variable!r})")
     else:
-        options = ", ".join(f"{n}={v!r}" for n, v in _panel_options(dataset, selection).items())
+        options = ", ".join(
+            f"{n}={v!r}" for n, v in _build_panel_arguments(dataset, selection).items()
+        )
         lines.append(f"panel = rsfstudy.Panel({options})")
         lines.append(f"figure = rsfstudy.plot({shown}, user_figure=rsfstudy.Figure([panel]))")
     lines.append('figure.savefig("figure.pdf")')
-    if cell is not None:
-        lines += ["", f"scene, outcome = rsfstudy.recompute_cell(results, {cell_place!r})"]
-        lines += ["print(outcome.status.label, outcome.values)", cell.code]
+    if recomputed_cell is not None:
+        lines += ["", f"scene, outcome = rsfstudy.recompute_cell(results, {cell_coordinates!r})"]
+        lines += ["print(outcome.status.label, outcome.values)", recomputed_cell.motion_code]
     return "\n".join(lines) + "\n"
 
 
-def write_commands(
-    selection: Selection, file: str, state: str, cell_place: Mapping[str, Any] | None
+def write_selection_as_shell_commands(
+    selection: PlotSelection,
+    results_path: str,
+    widget_state_json: str,
+    cell_coordinates: Mapping[str, Any] | None,
 ) -> str:
     """Write commands that reproduce a selection.
 
@@ -123,14 +132,22 @@ def write_commands(
     str
         Commands for a shell, or a comment if the results were not read from a file.
     """
-    if not file:
+    if not results_path:
         return "# The results were not read from a file. Save them with rsfstudy.run first.\n"
     commands = [
-        ["rsfstudy", "export", file, "--csv", "--output", "table.csv"],
-        ["rsfstudy", "plot", file, "--variable", selection.variable, "--output", "figure.pdf"],
-        ["rsfstudy", "explore", file, "--state", state],
+        ["rsfstudy", "export", results_path, "--csv", "--output", "table.csv"],
+        [
+            "rsfstudy",
+            "plot",
+            results_path,
+            "--variable",
+            selection.variable,
+            "--output",
+            "figure.pdf",
+        ],
+        ["rsfstudy", "explore", results_path, "--state", widget_state_json],
     ]
-    if cell_place is not None:
-        cells = [word for n, v in cell_place.items() for word in ("--cell", f"{n}={v}")]
-        commands.append(["rsfstudy", "rerun", file, *cells])
+    if cell_coordinates is not None:
+        cells = [word for n, v in cell_coordinates.items() for word in ("--cell", f"{n}={v}")]
+        commands.append(["rsfstudy", "rerun", results_path, *cells])
     return "".join(f"{shlex.join(command)}\n" for command in commands)

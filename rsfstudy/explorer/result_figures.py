@@ -25,29 +25,29 @@ from bokeh.models import (
 from bokeh.plotting import figure
 
 from rsfstudy.explorer.result_arrays import (
-    Curve,
-    Map,
-    Marks,
-    curves_of_panel,
-    describe_points,
-    describe_status,
-    find_marks,
-    map_of_panel,
-    sample_map,
-    thin_points,
-    to_plain_text,
+    CurveData,
+    MapData,
+    StatusMarks,
+    choose_evenly_spaced_indices,
+    convert_mathtext_to_unicode,
+    describe_selected_points,
+    extract_curves_of_panel,
+    extract_map_of_panel,
+    find_cells_to_mark,
+    format_status_name,
+    sample_map_at_pixels,
 )
 from rsfstudy.explorer.result_scales import (
-    colour_scale,
-    flag_names,
-    is_log_axis,
-    is_numeric,
-    label_ticks,
-    map_colour,
-    ticks,
-    value_mapper,
+    build_colour_mapper_of_dimension,
+    build_colour_mapper_of_map,
+    build_ticker_and_labels,
+    find_colour_of_value,
+    find_used_flag_names,
+    has_numeric_dtype,
+    is_log_spaced_coordinate,
+    set_tick_labels,
 )
-from rsfstudy.explorer.result_selections import Selection
+from rsfstudy.explorer.result_selections import PlotSelection
 from rsfstudy.plots import (
     are_log_spaced,
     are_positive_and_span_decades,
@@ -60,7 +60,7 @@ from rsfstudy.plots import (
 from rsfstudy.status import Status
 
 #: Function that receives the number of the cell that the user clicks.
-OnCell = Callable[[int], None]
+CellClickCallback = Callable[[int], None]
 
 #: Number of points of a curve above which its markers are small, and maximum number of points that
 #: the pointer can select.
@@ -69,20 +69,20 @@ _MAX_POINTS_WITH_MARKERS, _MAX_SELECTABLE_POINTS = 60, 6000
 #: a larger lattice.
 _MAX_CELLS_OF_IMAGE, _PIXELS = 2**21, (1000, 1400)
 #: Number of rows of status symbols at the bottom of a figure.
-_STATUS_ROWS = 8
-_DASHES = {"-": [], "--": [6, 3], ":": [2, 3], "-.": [6, 3, 2, 3]}
-_MARKERS = {
+_STATUS_SYMBOL_ROW_COUNT = 8
+_BOKEH_DASH_BY_MATPLOTLIB_LINESTYLE = {"-": [], "--": [6, 3], ":": [2, 3], "-.": [6, 3, 2, 3]}
+_BOKEH_MARKER_BY_MATPLOTLIB_MARKER = {
     "o": "circle", "s": "square", "^": "triangle", "D": "diamond", "v": "inverted_triangle",
     "<": "hex", ">": "plus", "P": "cross", "*": "star", "X": "square_pin",
 }  # fmt: skip
-_STATUS_SYMBOLS = (
+_BOKEH_MARKERS_OF_STATUSES = (
     "x", "asterisk", "triangle_dot", "square_x", "circle_y", "diamond_cross", "y",
 )  # fmt: skip
 #: Colours of symbols of failures and of other statuses, and colour of cells without a value.
 _FAILURE_COLOUR, _ANSWER_COLOUR, _EMPTY_COLOUR = "#D55E00", "#444444", "#e4e4e4"
 
 
-class Plot(ABC):
+class ResultPlot(ABC):
     """Base class of plots with symbols for the statuses of cells.
 
     Parameters
@@ -102,43 +102,49 @@ class Plot(ABC):
         Figure.
     """
 
-    def __init__(self, dataset: xr.Dataset, panel: Selection, on_cell: OnCell, height: int) -> None:
+    def __init__(
+        self, dataset: xr.Dataset, panel: PlotSelection, on_cell: CellClickCallback, height: int
+    ) -> None:
         """Create the figure, and draw the panel."""
         self.on_cell = on_cell
         codes = np.unique(dataset["status"].values).tolist()
-        self._symbols = dict(zip(codes, _STATUS_SYMBOLS * 4, strict=False))
-        self.marks = ColumnDataSource(_mark_columns({}, Marks(*[np.array([], int)] * 4), [], []))
+        self._symbols = dict(zip(codes, _BOKEH_MARKERS_OF_STATUSES * 4, strict=False))
+        self.marks = ColumnDataSource(
+            _build_status_symbol_columns({}, StatusMarks(*[np.array([], int)] * 4), [], [])
+        )
         self.figure: Any = figure(
             height=height,
             sizing_mode="stretch_width",
-            x_axis_type="log" if is_log_axis(dataset, panel.x) else "linear",
-            y_axis_type=self.choose_y_type(dataset, panel),
+            x_axis_type="log" if is_log_spaced_coordinate(dataset, panel.x) else "linear",
+            y_axis_type=self.choose_y_axis_type(dataset, panel),
             tools="pan,wheel_zoom,box_zoom,reset,tap",
             toolbar_location="above",
             active_drag="box_zoom",
         )
-        self.figure.xaxis.axis_label = to_plain_text(format_axis_label(dataset, panel.x, 200))
+        self.figure.xaxis.axis_label = convert_mathtext_to_unicode(
+            format_axis_label(dataset, panel.x, 200)
+        )
         self.figure.axis.axis_label_text_font_style = "normal"
         self.figure.axis.axis_label_text_font_size = "12px"
-        if not is_numeric(dataset[panel.x]):
-            label_ticks(self.figure.xaxis, dict(enumerate(map(str, dataset[panel.x].values))))
-        self.draw(dataset, panel)
+        if not has_numeric_dtype(dataset[panel.x]):
+            set_tick_labels(self.figure.xaxis, dict(enumerate(map(str, dataset[panel.x].values))))
+        self.add_glyphs_and_tools(dataset, panel)
         if self.figure.legend:
             self.figure.add_layout(self.figure.legend[0], "below")
             self.figure.legend.update(
                 ncols=3, border_line_color=None, label_text_font_size="11px", location="left"
             )
-        self.update(dataset, panel)
+        self.update_data(dataset, panel)
 
     @abstractmethod
-    def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
+    def choose_y_axis_type(self, dataset: xr.Dataset, panel: PlotSelection) -> str:
         """Return "log" or "linear"."""
 
     @abstractmethod
-    def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
+    def add_glyphs_and_tools(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
         """Add the glyphs and tools to the figure."""
 
-    def update(self, dataset: xr.Dataset, panel: Selection) -> None:
+    def update_data(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
         """Replace the data of the plot.
 
         Parameters
@@ -148,17 +154,20 @@ class Plot(ABC):
         panel : Selection
             Selection that differs only in its points.
         """
-        title = describe_points(dataset, panel.points)
-        self.figure.title.text = to_plain_text(title[:1].upper() + title[1:])
+        title = describe_selected_points(dataset, panel.points)
+        self.figure.title.text = convert_mathtext_to_unicode(title[:1].upper() + title[1:])
 
-    def share_axes(self, other: Plot) -> None:
+    def share_axis_limits_with(self, other_plot: ResultPlot) -> None:
         """Use the axis limits of another plot, so that panels can be compared."""
-        self.figure.x_range, self.figure.y_range = other.figure.x_range, other.figure.y_range
-        for limits in (other.figure.x_range, other.figure.y_range):
+        self.figure.x_range, self.figure.y_range = (
+            other_plot.figure.x_range,
+            other_plot.figure.y_range,
+        )
+        for limits in (other_plot.figure.x_range, other_plot.figure.y_range):
             if isinstance(limits.renderers, list):
                 limits.renderers = [*limits.renderers, *self.figure.renderers[:2]]
 
-    def draw_marks(self, **options: Any) -> Any:
+    def draw_status_symbols(self, **options: Any) -> Any:
         """Draw the symbols of the statuses, and return their renderer."""
         drawn = self.figure.scatter(
             "x", "y", marker="marker", color="color", fill_alpha=0.0, size=9, line_width=1.5,
@@ -167,45 +176,47 @@ class Plot(ABC):
         self.figure.add_tools(HoverTool(renderers=[drawn], tooltips=[("status", "@status")]))
         return drawn
 
-    def set_marks(self, marks: Marks, x: Any, y: Any) -> None:
+    def set_status_symbols(self, status_marks: StatusMarks, x: Any, y: Any) -> None:
         """Replace the symbols of the statuses."""
-        self.marks.data = _mark_columns(self._symbols, marks, x, y)
+        self.marks.data = _build_status_symbol_columns(self._symbols, status_marks, x, y)
 
 
-def _mark_columns(symbols: dict[int, str], marks: Marks, x: Any, y: Any) -> dict[str, Any]:
+def _build_status_symbol_columns(
+    marker_by_status: dict[int, str], status_marks: StatusMarks, x: Any, y: Any
+) -> dict[str, Any]:
     """Return the data source columns of the status symbols."""
-    failed = marks.status >= int(Status.WORK_BUDGET_SPENT)
-    codes = marks.status.tolist()
+    failed = status_marks.status_codes >= int(Status.WORK_BUDGET_SPENT)
+    codes = status_marks.status_codes.tolist()
     return {
         "x": x,
         "y": y,
-        "cell": marks.cells,
-        "status": [describe_status(code) for code in codes],
-        "marker": [symbols[code] for code in codes],
+        "cell": status_marks.cell_numbers,
+        "status": [format_status_name(code) for code in codes],
+        "marker": [marker_by_status[code] for code in codes],
         "color": np.where(failed, _FAILURE_COLOUR, _ANSWER_COLOUR).tolist(),
     }
 
 
-class CurvesPlot(Plot):
+class CurvesPlot(ResultPlot):
     """Plot of curves with error bars, and with status symbols at the bottom."""
 
-    def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
+    def choose_y_axis_type(self, dataset: xr.Dataset, panel: PlotSelection) -> str:
         """Return "log" if all values of the variable are positive and span decades."""
         is_log = are_positive_and_span_decades(dataset[panel.variable].values)
-        return "log" if is_log and not flag_names(dataset, panel.variable) else "linear"
+        return "log" if is_log and not find_used_flag_names(dataset, panel.variable) else "linear"
 
-    def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
+    def add_glyphs_and_tools(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
         """Add curves, points, error bars, statuses, tooltips and a colour scale."""
         self.lines = ColumnDataSource({n: [] for n in ("xs", "ys", "color", "dash", "alpha")})
-        self.points = ColumnDataSource(_point_columns([], []))
+        self.points = ColumnDataSource(_build_point_columns([], []))
         label = format_axis_label(dataset, panel.variable, 200)
-        self.figure.yaxis.axis_label = to_plain_text(label)
+        self.figure.yaxis.axis_label = convert_mathtext_to_unicode(label)
         line = {"color": "color", "line_dash": "dash", "line_alpha": "alpha", "line_width": 1.6}
         self.figure.multi_line("xs", "ys", source=self.lines, **line)
         bars = Whisker(base="x", lower="low", upper="high", source=self.points)
         bars.upper_head.size = bars.lower_head.size = 6
         self.figure.add_layout(bars)
-        mapper = colour_scale(dataset, panel.second)
+        mapper = build_colour_mapper_of_dimension(dataset, panel.second)
         named: Any = {"legend_field": "name"} if panel.second and not mapper else {}
         points = self.figure.scatter(
             "x", "y", marker="marker", color="color", size="size", source=self.points,
@@ -214,20 +225,20 @@ class CurvesPlot(Plot):
         self.figure.y_range.update(renderers=[points], range_padding=0.2)
         self.figure.extra_y_ranges = {"status": Range1d(0.0, 1.0)}
         self.figure.extra_y_scales = {"status": LinearScale()}
-        marks = self.draw_marks(y_range_name="status", nonselection_line_alpha=0.4)
+        marks = self.draw_status_symbols(y_range_name="status", nonselection_line_alpha=0.4)
         tips = [("value", "@y{0.000000e+0} ± @error{0.0e+0}"), ("x", "@x{0.000000e+0}")]
         tips += [("curve", "@name")] * bool(panel.second) + [("status", "@status")]
         self.figure.add_tools(HoverTool(renderers=[points], tooltips=tips))
         self.figure.select_one(TapTool).renderers = [points, marks]
         for source in (self.points, self.marks):
-            source.selected.on_change("indices", self._select)
+            source.selected.on_change("indices", self._handle_point_selection)
         if mapper:
-            title = to_plain_text(format_axis_label(dataset, panel.second, 200))
+            title = convert_mathtext_to_unicode(format_axis_label(dataset, panel.second, 200))
             bar = ColorBar(color_mapper=mapper, title=title, title_text_font_style="normal")
             self.figure.add_layout(bar, "right")
-        label_ticks(self.figure.yaxis, flag_names(dataset, panel.variable))
+        set_tick_labels(self.figure.yaxis, find_used_flag_names(dataset, panel.variable))
 
-    def _select(self, _name: str, _old: Any, _new: Any) -> None:
+    def _handle_point_selection(self, _name: str, _old: Any, _new: Any) -> None:
         """Call ``on_cell`` with the cell of the selected point or symbol."""
         for source in (self.points, self.marks):
             for index in source.selected.indices[:1]:
@@ -235,71 +246,81 @@ class CurvesPlot(Plot):
                     self.on_cell(cell)
                     return
 
-    def update(self, dataset: xr.Dataset, panel: Selection) -> None:
+    def update_data(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
         """Replace the data of the plot. See ``Plot.update``."""
-        super().update(dataset, panel)
-        curves = curves_of_panel(dataset, panel)
-        styles = _curve_styles(dataset, panel, curves)
+        super().update_data(dataset, panel)
+        curves = extract_curves_of_panel(dataset, panel)
+        styles = _choose_curve_styles(dataset, panel, curves)
         self.points.selected.indices = self.marks.selected.indices = []
         self.lines.data = {
             "xs": [c.x for c in curves],
             "ys": [c.y for c in curves],
             **{name: [s[name] for s in styles] for name in ("color", "dash", "alpha")},
         }
-        self.points.data = _point_columns(curves, styles)
-        pairs = [find_marks(c.status[None], c.cells[None]) for c in curves]
-        at = [c.x[m.columns] for c, m in zip(curves, pairs, strict=True)]
-        rows = [np.full(m.rows.size, 0.03 + 0.05 * (i % _STATUS_ROWS)) for i, m in enumerate(pairs)]
-        marks = Marks(*(np.concatenate(parts) for parts in zip(*pairs, strict=True)))
-        self.set_marks(marks, np.concatenate(at), np.concatenate(rows))
+        self.points.data = _build_point_columns(curves, styles)
+        pairs = [find_cells_to_mark(c.status_codes[None], c.cell_numbers[None]) for c in curves]
+        at = [c.x[m.column_indices] for c, m in zip(curves, pairs, strict=True)]
+        rows = [
+            np.full(m.row_indices.size, 0.03 + 0.05 * (i % _STATUS_SYMBOL_ROW_COUNT))
+            for i, m in enumerate(pairs)
+        ]
+        marks = StatusMarks(*(np.concatenate(parts) for parts in zip(*pairs, strict=True)))
+        self.set_status_symbols(marks, np.concatenate(at), np.concatenate(rows))
 
 
-def _curve_styles(
-    dataset: xr.Dataset, panel: Selection, curves: Sequence[Curve]
+def _choose_curve_styles(
+    dataset: xr.Dataset, panel: PlotSelection, curves: Sequence[CurveData]
 ) -> list[dict[str, Any]]:
     """Return the colour, dashes, opacity, marker and marker size of each curve."""
     with style_context():
-        cycled = [cycle_style(c.number) for c in curves]
+        cycled = [cycle_style(c.point_index) for c in curves]
     colours, dashes = [s["color"] for s in cycled], [s["linestyle"] for s in cycled]
-    if mapper := colour_scale(dataset, panel.second):
+    if mapper := build_colour_mapper_of_dimension(dataset, panel.second):
         points = dataset[panel.second].values.astype(float)
-        colours = [map_colour(mapper, points[c.number]) for c in curves]
+        colours = [find_colour_of_value(mapper, points[c.point_index]) for c in curves]
         dashes = ["-"] * len(curves)
     is_recorded = panel.x in dataset.data_vars
-    is_number = is_numeric(dataset[panel.x]) and not flag_names(dataset, panel.variable)
-    has_line = is_number and (is_recorded or all(_is_monotonic(c.x) for c in curves))
+    is_number = has_numeric_dtype(dataset[panel.x]) and not find_used_flag_names(
+        dataset, panel.variable
+    )
+    has_line = is_number and (is_recorded or all(_is_strictly_monotonic(c.x) for c in curves))
     return [
         {
             "color": colour,
-            "dash": _DASHES.get(dash) if isinstance(dash, str) else list(dash[1]),
+            "dash": _BOKEH_DASH_BY_MATPLOTLIB_LINESTYLE.get(dash)
+            if isinstance(dash, str)
+            else list(dash[1]),
             "alpha": float(has_line),
-            "marker": _MARKERS[cycle_marker(curve.number)],
+            "marker": _BOKEH_MARKER_BY_MATPLOTLIB_MARKER[cycle_marker(curve.point_index)],
             "size": 6 if curve.x.size <= _MAX_POINTS_WITH_MARKERS or not has_line else 2,
         }
         for curve, colour, dash in zip(curves, colours, dashes, strict=True)
     ]
 
 
-def _is_monotonic(values: np.ndarray) -> bool:
+def _is_strictly_monotonic(values: np.ndarray) -> bool:
     """Return True if values increase or decrease strictly."""
     steps = np.diff(values)
     return bool((steps > 0.0).all() or (steps < 0.0).all())
 
 
-def _point_columns(curves: Sequence[Curve], styles: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _build_point_columns(
+    curves: Sequence[CurveData], styles: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
     """Return the data source columns of the points and error bars."""
     total = sum(c.x.size for c in curves)
     each = total if total <= _MAX_SELECTABLE_POINTS else _MAX_SELECTABLE_POINTS // len(curves)
-    kept = [thin_points(c.x.size, each) for c in curves]
+    kept = [choose_evenly_spaced_indices(c.x.size, each) for c in curves]
     numbers = [
-        np.stack([c.x, c.y, c.error, c.cells])[:, k] for c, k in zip(curves, kept, strict=True)
+        np.stack([c.x, c.y, c.y_error, c.cell_numbers])[:, k]
+        for c, k in zip(curves, kept, strict=True)
     ]
     rows: dict[str, Any] = dict(
         zip(("x", "y", "error", "cell"), np.hstack([np.empty((4, 0)), *numbers]), strict=True)
     )
-    codes = [code for c, k in zip(curves, kept, strict=True) for code in c.status[k].tolist()]
-    rows["status"] = [describe_status(code) for code in codes]
-    rows["name"] = [c.name for c, k in zip(curves, kept, strict=True) for _ in k]
+    codes = [code for c, k in zip(curves, kept, strict=True) for code in c.status_codes[k].tolist()]
+    rows["status"] = [format_status_name(code) for code in codes]
+    rows["name"] = [c.label for c, k in zip(curves, kept, strict=True) for _ in k]
     for name in ("color", "marker", "size"):
         rows[name] = [s[name] for s, k in zip(styles, kept, strict=True) for _ in k]
     low = rows["y"] - rows["error"]
@@ -309,74 +330,82 @@ def _point_columns(curves: Sequence[Curve], styles: Sequence[dict[str, Any]]) ->
     return rows | {"low": np.maximum(low, least), "high": rows["y"] + rows["error"]}
 
 
-class MapPlot(Plot):
+class MapPlot(ResultPlot):
     """Colour map with status symbols, in which cells without a value are grey."""
 
-    def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
+    def choose_y_axis_type(self, dataset: xr.Dataset, panel: PlotSelection) -> str:
         """Return "log" if the points along y are spaced logarithmically."""
-        return "log" if is_log_axis(dataset, panel.second) else "linear"
+        return "log" if is_log_spaced_coordinate(dataset, panel.second) else "linear"
 
-    def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
+    def add_glyphs_and_tools(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
         """Add the image, its colour scale, the symbols of statuses and the tooltips."""
-        self.figure.yaxis.axis_label = to_plain_text(format_axis_label(dataset, panel.second, 200))
+        self.figure.yaxis.axis_label = convert_mathtext_to_unicode(
+            format_axis_label(dataset, panel.second, 200)
+        )
         self.image = ColumnDataSource({n: [] for n in ("image", "x", "y", "dw", "dh")})
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self.figure.grid.visible = False
         self.figure.background_fill_color = _EMPTY_COLOUR
-        flags = flag_names(dataset, panel.variable)
-        mapper = value_mapper(dataset[panel.variable].values, flags)
+        flags = find_used_flag_names(dataset, panel.variable)
+        mapper = build_colour_mapper_of_map(dataset[panel.variable].values, flags)
         drawn = self.figure.image(
             image="image", x="x", y="y", dw="dw", dh="dh", source=self.image, color_mapper=mapper
         )
-        self.draw_marks()
+        self.draw_status_symbols()
         self.figure.scatter(
             "x", "y", source=self.chosen, marker="square", size=14, fill_alpha=0.0,
             line_color="black", line_width=2.5,
         )  # fmt: skip
         tips = [("value", "@image{0.000000e+0}"), ("x", "$x{0.0000e+0}"), ("y", "$y{0.0000e+0}")]
         self.figure.add_tools(HoverTool(renderers=[drawn], tooltips=tips))
-        title = to_plain_text(format_axis_label(dataset, panel.variable, 200))
+        title = convert_mathtext_to_unicode(format_axis_label(dataset, panel.variable, 200))
         bar = ColorBar(color_mapper=mapper, title=title, title_text_font_style="normal")
         if flags:
-            bar.ticker, bar.major_label_overrides = ticks(dict(enumerate(flags.values())))
+            bar.ticker, bar.major_label_overrides = build_ticker_and_labels(
+                dict(enumerate(flags.values()))
+            )
         self.figure.add_layout(bar, "right")
-        self.figure.on_event(Tap, self._select)
+        self.figure.on_event(Tap, self._handle_click)
 
-    def _select(self, event: Any) -> None:
+    def _handle_click(self, event: Any) -> None:
         """Call ``on_cell`` with the cell at the position of the pointer."""
-        if event.x is None or (cell := self.map.cell_at(event.x, event.y)) < 0:
+        if event.x is None or (cell := self.map.find_cell_number_at(event.x, event.y)) < 0:
             return
-        row, column = np.argwhere(self.map.cells == cell)[0]
+        row, column = np.argwhere(self.map.cell_numbers == cell)[0]
         self.chosen.data = {"x": [self.map.x[column]], "y": [self.map.y[row]]}
         self.on_cell(cell)
 
-    def update(self, dataset: xr.Dataset, panel: Selection) -> None:
+    def update_data(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
         """Replace the data of the plot. See ``Plot.update``."""
-        super().update(dataset, panel)
-        self.map = found = map_of_panel(dataset, panel)
-        values, (x, y) = _image_of_map(found)
-        if flags := flag_names(dataset, panel.variable):
+        super().update_data(dataset, panel)
+        self.map = found = extract_map_of_panel(dataset, panel)
+        values, (x, y) = _convert_map_to_image(found)
+        if flags := find_used_flag_names(dataset, panel.variable):
             numbers = np.searchsorted(list(flags), values).astype(float)
             values = np.where(np.isfinite(values), numbers, np.nan)
         self.image.data = {
             "image": [values.astype(np.float32)], "x": [x[0]], "y": [y[0]],
             "dw": [x[1] - x[0]], "dh": [y[1] - y[0]],
         }  # fmt: skip
-        marks = find_marks(found.status, found.cells)
-        self.set_marks(marks, found.x[marks.columns], found.y[marks.rows])
+        marks = find_cells_to_mark(found.status_codes, found.cell_numbers)
+        self.set_status_symbols(marks, found.x[marks.column_indices], found.y[marks.row_indices])
         self.chosen.data = {"x": [], "y": []}
 
 
-def _image_of_map(found: Map) -> tuple[np.ndarray, list[tuple[float, float]]]:
+def _convert_map_to_image(map_data: MapData) -> tuple[np.ndarray, list[tuple[float, float]]]:
     """Return the image of a map, and the limits of the image along x and y.
 
     If all cells have the same size on the axes, each pixel of the image is one cell.
     """
-    limits, is_even = [], found.values.size <= _MAX_CELLS_OF_IMAGE
-    for points in (found.x, found.y):
+    limits, is_even = [], map_data.values.size <= _MAX_CELLS_OF_IMAGE
+    for points in (map_data.x, map_data.y):
         is_log = are_log_spaced(points)
         edges = compute_cell_edges(points, is_log)
         sizes = np.diff(np.log(edges) if is_log else edges)
         is_even = is_even and bool(np.ptp(sizes) < 1e-6 * sizes[0])
         limits.append((float(edges[0]), float(edges[-1])))
-    return (found.values if is_even else sample_map(found, limits[0], limits[1], _PIXELS)), limits
+    return (
+        map_data.values
+        if is_even
+        else sample_map_at_pixels(map_data, limits[0], limits[1], _PIXELS)
+    ), limits

@@ -22,15 +22,15 @@ from rsfstudy.vocabulary import find_coverage_content_type
 #: Kinds of plots.
 LINES, MAP = "lines", "map"
 #: Maximum number of curves that a new selection shows.
-_MAX_CURVES_AT_START = 12
+_MAX_CURVES_OF_NEW_SELECTION = 12
 #: Minimum number of points of both axes for which a new selection shows a map.
-_MIN_POINTS_OF_MAP_AT_START = 6
+_MIN_AXIS_POINTS_FOR_DEFAULT_MAP = 6
 #: Variables of each cell that are offered although they are not results.
-_VARIABLES_OF_CELLS = ("status", "rhs_evaluations", "wall_time")
+_STATUS_AND_COST_VARIABLES = ("status", "rhs_evaluations", "wall_time")
 
 
 @dataclass(frozen=True)
-class Selection:
+class PlotSelection:
     """Variable, axes and points of a plot.
 
     Parameters
@@ -58,31 +58,31 @@ class Selection:
     points: Mapping[str, int] = field(default_factory=dict)
 
 
-def plotted_variables(dataset: xr.Dataset) -> list[str]:
+def list_plottable_variables(dataset: xr.Dataset) -> list[str]:
     """Return the names of the variables that can be plotted.
 
     The primary output is the first name, followed by the other results, the status and the costs.
     """
-    main = StoredDataset(dataset).primary_output
+    main = StoredDataset(dataset).primary_output_name
     if main is not None and main not in dataset:
-        main = DatasetUnits.dimensional_name(main)
+        main = DatasetUnits.convert_to_dimensional_name(main)
     names = [
         str(name)
         for name, values in dataset.data_vars.items()
         if values.ndim and (values.dtype.kind in "iuf" or read_flag_meanings(values.attrs))
     ]
     results = [n for n in names if find_coverage_content_type(n) == "modelResult" and n != main]
-    return [n for n in (main, *results, *_VARIABLES_OF_CELLS) if n in names]
+    return [n for n in (main, *results, *_STATUS_AND_COST_VARIABLES) if n in names]
 
 
-def list_x_choices(dataset: xr.Dataset, variable: str) -> list[str]:
+def list_x_axis_choices(dataset: xr.Dataset, variable_name: str) -> list[str]:
     """Return the names of all quantities that can be plotted along x.
 
     Besides the dimensions of the variable, the list contains the numeric coordinates along one of
     these dimensions. If the variable was recorded inside each cell, for example along an orbit, the
     list also contains the other variables that were recorded at the same points.
     """
-    values, inner = dataset[variable], _inner_dimensions(dataset, variable)
+    values, inner = dataset[variable_name], _list_non_lattice_dimensions(dataset, variable_name)
     coordinates = [
         str(name)
         for name, found in dataset.coords.items()
@@ -91,29 +91,29 @@ def list_x_choices(dataset: xr.Dataset, variable: str) -> list[str]:
     recorded = [
         str(name)
         for name, found in dataset.data_vars.items()
-        if name != variable and {*inner} & {*found.dims} and {*found.dims} <= {*values.dims}
+        if name != variable_name and {*inner} & {*found.dims} and {*found.dims} <= {*values.dims}
     ]
     varying = [n for n in coordinates if len(np.unique(dataset[n].values.astype(str))) > 1]
     numeric = [n for n in (*varying, *recorded) if dataset[n].dtype.kind in "iuf"]
     return [*map(str, values.dims), *numeric]
 
 
-def _inner_dimensions(dataset: xr.Dataset, variable: str) -> list[str]:
+def _list_non_lattice_dimensions(dataset: xr.Dataset, variable_name: str) -> list[str]:
     """Return the dimensions of a variable that do not belong to the lattice."""
-    return [str(d) for d in dataset[variable].dims if d not in dataset["status"].dims]
+    return [str(d) for d in dataset[variable_name].dims if d not in dataset["status"].dims]
 
 
-def dimension_along_x(dataset: xr.Dataset, variable: str, x: str) -> str:
+def find_dimension_along_x(dataset: xr.Dataset, variable_name: str, x_name: str) -> str:
     """Return the dimension that is plotted along x."""
-    if x in dataset[variable].dims:
-        return x
-    inner = _inner_dimensions(dataset, variable)
-    return next((d for d in inner if d in dataset[x].dims), str(dataset[x].dims[0]))
+    if x_name in dataset[variable_name].dims:
+        return x_name
+    inner = _list_non_lattice_dimensions(dataset, variable_name)
+    return next((d for d in inner if d in dataset[x_name].dims), str(dataset[x_name].dims[0]))
 
 
-def list_map_dimensions(dataset: xr.Dataset, variable: str) -> list[str]:
+def list_map_dimensions(dataset: xr.Dataset, variable_name: str) -> list[str]:
     """Return the numeric dimensions of a variable that have at least two points."""
-    dims = map(str, dataset[variable].dims)
+    dims = map(str, dataset[variable_name].dims)
     return [d for d in dims if dataset.sizes[d] > 1 and dataset[d].dtype.kind in "iuf"]
 
 
@@ -125,7 +125,7 @@ def complete_selection(
     second: str | None = None,
     facet: str | None = None,
     points: Mapping[str, int] | None = None,
-) -> Selection:
+) -> PlotSelection:
     """Complete a selection by adding defaults to the requested choices.
 
     A default replaces each choice that is missing or that contradicts another choice. For example,
@@ -151,55 +151,61 @@ def complete_selection(
     InvalidValue
         If a name or an index does not exist in the results.
     """
-    names = plotted_variables(dataset)
+    names = list_plottable_variables(dataset)
     if not names:
         raise InvalidValue("variable", None, "is missing: the results contain no numbers")
-    variable = _check_choice("variable", variable, names) or names[0]
+    variable = _check_choice_exists("variable", variable, names) or names[0]
     plane = list_map_dimensions(dataset, variable)
-    if _check_choice("kind", kind, (LINES, MAP)) is None:
-        large = [d for d in plane if dataset.sizes[d] >= _MIN_POINTS_OF_MAP_AT_START]
-        kind = MAP if len(large) > 1 and not _inner_dimensions(dataset, variable) else LINES
+    if _check_choice_exists("kind", kind, (LINES, MAP)) is None:
+        large = [d for d in plane if dataset.sizes[d] >= _MIN_AXIS_POINTS_FOR_DEFAULT_MAP]
+        kind = (
+            MAP if len(large) > 1 and not _list_non_lattice_dimensions(dataset, variable) else LINES
+        )
     kind = kind if len(plane) > 1 else LINES
-    across = plane if kind == MAP else list_x_choices(dataset, variable)
+    across = plane if kind == MAP else list_x_axis_choices(dataset, variable)
     known = [str(name) for name in dataset.variables]
-    if _check_choice("x", x, known) not in across:
-        x = _default_x(dataset, variable, plane if kind == MAP else plane or across)
-    along = dimension_along_x(dataset, variable, str(x))
+    if _check_choice_exists("x", x, known) not in across:
+        x = _choose_default_x(dataset, variable, plane if kind == MAP else plane or across)
+    along = find_dimension_along_x(dataset, variable, str(x))
     others = [d for d in map(str, dataset[variable].dims) if d != along]
     candidates = [d for d in others if d in plane or kind == LINES]
-    if _check_choice("second", second, ["", *known]) not in candidates + [""] * (kind == LINES):
-        second = _default_second(dataset, candidates, kind)
+    if _check_choice_exists("second", second, ["", *known]) not in candidates + [""] * (
+        kind == LINES
+    ):
+        second = _choose_default_second_dimension(dataset, candidates, kind)
     left = [d for d in others if d != second]
-    facet = facet if _check_choice("facet", facet, ["", *known]) in left else ""
+    facet = facet if _check_choice_exists("facet", facet, ["", *known]) in left else ""
     given = points or {}
     if not isinstance(given, Mapping):
         raise InvalidValue("points", given, "must map names of dimensions to indices")
     for name, index in given.items():
-        _check_choice("points", name, list(map(str, dataset.dims)))
+        _check_choice_exists("points", name, list(map(str, dataset.dims)))
         if not isinstance(index, int) or not 0 <= index < dataset.sizes[name]:
             rule = f"is not an index of {name}, which has {dataset.sizes[name]} points"
             raise InvalidValue("points", index, rule)
     chosen = {d: given.get(d, 0) for d in left if d != facet}
-    return Selection(variable, str(kind), str(x), second or "", facet or "", chosen)
+    return PlotSelection(variable, str(kind), str(x), second or "", facet or "", chosen)
 
 
-def _check_choice(what: str, value: Any, choices: Sequence[str]) -> Any:
+def _check_choice_exists(choice_name: str, value: Any, choices: Sequence[str]) -> Any:
     """Return a requested choice, and raise ``InvalidValue`` if it does not exist."""
     if value is not None and value not in choices:
-        raise InvalidValue(what, value, "does not exist in these results", choices=choices)
+        raise InvalidValue(choice_name, value, "does not exist in these results", choices=choices)
     return value
 
 
-def _default_x(dataset: xr.Dataset, variable: str, choices: Sequence[str]) -> str:
+def _choose_default_x(dataset: xr.Dataset, variable_name: str, choices: Sequence[str]) -> str:
     """Return the last dimension inside the cells, or else the longest dimension."""
-    if inner := [d for d in _inner_dimensions(dataset, variable) if d in choices]:
+    if inner := [d for d in _list_non_lattice_dimensions(dataset, variable_name) if d in choices]:
         return inner[-1]
     return max(reversed(choices), key=lambda name: dataset[name].size)
 
 
-def _default_second(dataset: xr.Dataset, candidates: Sequence[str], kind: str | None) -> str:
+def _choose_default_second_dimension(
+    dataset: xr.Dataset, candidates: Sequence[str], plot_kind: str | None
+) -> str:
     """Return the largest dimension for which all curves can be distinguished."""
-    if kind == MAP:
+    if plot_kind == MAP:
         return max(candidates, key=lambda name: dataset.sizes[name])
-    few = [d for d in candidates if 1 < dataset.sizes[d] <= _MAX_CURVES_AT_START]
+    few = [d for d in candidates if 1 < dataset.sizes[d] <= _MAX_CURVES_OF_NEW_SELECTION]
     return max(few, key=lambda name: dataset.sizes[name]) if few else ""

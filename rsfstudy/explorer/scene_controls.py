@@ -10,19 +10,19 @@ import panel as pn
 
 from rsfstudy.explorer.field_widgets import POSITIVE, NumberWidget, SliderRange
 from rsfstudy.explorer.scene_settings import (
-    PROTOCOL,
-    QUANTITY_BY_FIELD,
-    README_RIG,
-    UNITS_BY_SCALE,
+    DISPLAY_UNITS_BY_SCALE,
+    PROTOCOL_LOADING_NAME,
+    QUANTITY_BY_SCENE_FIELD,
+    README_RIG_QUANTITIES,
     SceneSettings,
-    rig_name,
-    scale_in_units,
+    convert_scale_to_display_units,
+    find_dimensional_field_name,
 )
 from rsfstudy.rig import Rig
 from rsfstudy.slider import SceneFields, SliderParameters
 
 #: Values of fields whose default is 0 or None, when the user selects the part of the field.
-_TYPICAL_VALUES = {
+_TYPICAL_VALUE_BY_FIELD = {
     "hold_time": 100.0, "radiation_damping": 1e-3, "oscillation_amplitude": 0.01,
     "normal_stress_ramp": 0.1, "velocity_oscillation": 0.5, "velocity_ramp": 9.0,
     "velocity_steps": 2.0, "load_velocity_ratio": 1.0, "displacement_step": 1.0,
@@ -32,7 +32,7 @@ _TYPICAL_VALUES = {
     "direct_activation": 35.0, "evolution_activation": 35.0,
 }  # fmt: skip
 #: Quantities of a rig that a part needs in addition to the quantities that every rig needs.
-_RIG_QUANTITIES_OF_PART = {
+_EXTRA_RIG_QUANTITIES_BY_PART = {
     "inertia": ("period",),
     "radiation_damping": ("shear_modulus", "density"),
     "shear_heating": (
@@ -40,19 +40,19 @@ _RIG_QUANTITIES_OF_PART = {
     ),
     "thermal": ("pressurisation_factor",),
 }  # fmt: skip
-_STIFFNESS = {*SceneFields.ALTERNATIVE_STIFFNESS}
+_STIFFNESS_FIELDS = {*SceneFields.ALTERNATIVE_NAMES_FOR_STIFFNESS}
 #: Fields that follow from the quantities of a rig.
-_FIELDS_OF_RIG = {
+_FIELDS_DERIVED_FROM_RIG = {
     "inertia", "stiffness_ratio", "stiffness", "reference_rate", "period", "radiation_damping",
     "heating", "cooling", "direct_activation", "evolution_activation", "pressurisation",
 }  # fmt: skip
-_TYPICAL_RIG_QUANTITIES = README_RIG | {
+_TYPICAL_VALUE_BY_RIG_QUANTITY = README_RIG_QUANTITIES | {
     "period": "0.01 s", "shear_modulus": "30 GPa", "density": "2700 kg/m^3",
     "thermal_diffusivity": "1 mm^2/s", "heat_capacity": "2.4 MJ/m^3/K",
     "shear_zone_width": "0.1 mm", "reference_temperature": "295 K",
     "pressurisation_factor": "0.3 MPa/K",
 }  # fmt: skip
-_PROTOCOL_TEMPLATE = {
+_PROTOCOL_TEMPLATE_BY_HAS_RIG = {
     True: "velocity (um/s), duration (s)\n10, 60\n0, 600\n10, 60\n",
     False: "velocity (V_*), duration (D_c/V_*)\n10, 6\n0, 60\n10, 6\n",
 }
@@ -80,9 +80,9 @@ class SceneControls:
         """Create the cards."""
         self.column = pn.Column(margin=0)
         self._changed = changed
-        self.show(settings)
+        self.rebuild_widgets(settings)
 
-    def show(self, settings: SceneSettings) -> None:
+    def rebuild_widgets(self, settings: SceneSettings) -> None:
         """Recreate the widgets after the settings have changed.
 
         Parameters
@@ -96,21 +96,27 @@ class SceneControls:
             label="Units", options=["dimensionless", "rig"], value="rig" if self._rig else
             "dimensionless", width=270,
         )  # fmt: skip
-        units.param.watch(lambda event: self._choose_units(event.new), "value")
-        cards = [self._card("rig", self._rig_widgets())] if self._rig else []
-        slider_fields = SceneFields.names_of_part(SliderParameters)
-        cards.append(self._card("slider", self._fields(SliderParameters, slider_fields[:4])))
+        units.param.watch(lambda event: self._convert_settings_to_units(event.new), "value")
+        cards = [self._create_card("rig", self._create_rig_widgets())] if self._rig else []
+        slider_fields = SceneFields.list_names_of_part(SliderParameters)
+        cards.append(
+            self._create_card(
+                "slider", self._create_field_widgets(SliderParameters, slider_fields[:4])
+            )
+        )
         cards += [
-            self._card(f"{slot.name}: {self.part_of_slot(slot)}", self._slot_widgets(slot))
-            for slot in SceneFields.SLOTS
+            self._create_card(
+                f"{slot.name}: {self.find_part_name_of_slot(slot)}", self._create_slot_widgets(slot)
+            )
+            for slot in SceneFields.PART_SLOTS
         ]
-        more = self._fields(SliderParameters, slider_fields[4:])
-        cards.append(self._card("other slider parameters", more, collapsed=True))
+        more = self._create_field_widgets(SliderParameters, slider_fields[4:])
+        cards.append(self._create_card("other slider parameters", more, collapsed=True))
         self.column.objects = [units, *cards]
 
     # ---- parts ----------------------------------------------------------------------------------
 
-    def part_of_slot(self, slot: Any) -> str:
+    def find_part_name_of_slot(self, slot: Any) -> str:
         """Return the name of the part that the settings select for a slot.
 
         Parameters
@@ -125,7 +131,7 @@ class SceneControls:
         """
         fields = self.settings.scene
         if slot.name == "loading" and self.settings.protocol:
-            return PROTOCOL
+            return PROTOCOL_LOADING_NAME
         for selecting, part in slot.part_class_by_selecting_field.items():
             if fields.get(selecting) or (selecting == "inertia" and "period" in self.settings.rig):
                 return str(part.name)
@@ -133,51 +139,57 @@ class SceneControls:
                 return str(part.name)
         return str(fields.get(slot.name, slot.default_part_name))
 
-    def _choose_part(self, slot: Any, name: str) -> None:
+    def _select_part(self, slot: Any, part_name: str) -> None:
         """Select a part, and drop the fields of the previous part."""
         classes = {**slot.built_in_parts, **slot.user_parts}
-        classes.pop(PROTOCOL, None)
-        old = classes.get(self.part_of_slot(slot))
-        new = classes.get(name)
-        kept = set(SceneFields.names_of_part(new)) if new else set()
-        dropped = set(SceneFields.names_of_part(old)) - kept if old else set()
-        dropped |= {rig_name(field) for field in dropped}
+        classes.pop(PROTOCOL_LOADING_NAME, None)
+        old = classes.get(self.find_part_name_of_slot(slot))
+        new = classes.get(part_name)
+        kept = set(SceneFields.list_names_of_part(new)) if new else set()
+        dropped = set(SceneFields.list_names_of_part(old)) - kept if old else set()
+        dropped |= {find_dimensional_field_name(field) for field in dropped}
         fields = {n: v for n, v in self.settings.scene.items() if n not in dropped}
         if not slot.part_class_by_selecting_field:
-            fields[slot.name] = name
+            fields[slot.name] = part_name
         elif new is not None and new.selected_by and (self._rig is None or slot.name == "loading"):
-            fields[new.selected_by] = self._typical(new.selected_by)
+            fields[new.selected_by] = self._find_typical_value(new.selected_by)
         rig = dict(self.settings.rig)
-        for quantity in _RIG_QUANTITIES_OF_PART.get(old.name, ()) if old else ():
+        for quantity in _EXTRA_RIG_QUANTITIES_BY_PART.get(old.name, ()) if old else ():
             rig.pop(quantity, None)
-        for quantity in _RIG_QUANTITIES_OF_PART.get(name, ()) if rig else ():
-            rig[quantity] = _TYPICAL_RIG_QUANTITIES[quantity]
+        for quantity in _EXTRA_RIG_QUANTITIES_BY_PART.get(part_name, ()) if rig else ():
+            rig[quantity] = _TYPICAL_VALUE_BY_RIG_QUANTITY[quantity]
         protocol = self.settings.protocol
         if slot.name == "loading":
-            protocol = _PROTOCOL_TEMPLATE[bool(rig)] if name == PROTOCOL else ""
-        self.show(replace(self.settings, scene=fields, rig=rig, protocol=protocol))
+            protocol = (
+                _PROTOCOL_TEMPLATE_BY_HAS_RIG[bool(rig)]
+                if part_name == PROTOCOL_LOADING_NAME
+                else ""
+            )
+        self.rebuild_widgets(replace(self.settings, scene=fields, rig=rig, protocol=protocol))
         self._changed()
 
-    def _typical(self, field: str) -> Any:
+    def _find_typical_value(self, field_name: str) -> Any:
         """Return a typical value of a field, with units if there is a rig."""
-        if field == "inertia":
+        if field_name == "inertia":
             return True
-        value = _TYPICAL_VALUES.get(field, SceneFields.defaults()[field])
-        scale = QUANTITY_BY_FIELD[field].scale
+        value = _TYPICAL_VALUE_BY_FIELD.get(field_name, SceneFields.collect_defaults()[field_name])
+        scale = QUANTITY_BY_SCENE_FIELD[field_name].scale
         if self._rig is None or not scale:
             return value
-        return f"{value * scale_in_units(self._rig, scale):.4g} {UNITS_BY_SCALE[scale]}"
+        return f"{value * convert_scale_to_display_units(self._rig, scale):.4g} {DISPLAY_UNITS_BY_SCALE[scale]}"
 
-    def _choose_units(self, units: str) -> None:
+    def _convert_settings_to_units(self, units: str) -> None:
         """Express the scene in rig units or in dimensionless form."""
         scene = self.settings.build_scene(self._rig)
-        rig = None if units == "dimensionless" else Rig(**README_RIG)
-        self.show(SceneSettings.from_scene(scene, rig))
+        rig = None if units == "dimensionless" else Rig(**README_RIG_QUANTITIES)
+        self.rebuild_widgets(SceneSettings.from_scene(scene, rig))
         self._changed()
 
     # ---- widgets --------------------------------------------------------------------------------
 
-    def _card(self, title: str, widgets: list[Any], collapsed: bool | None = None) -> pn.Card:
+    def _create_card(
+        self, title: str, widgets: list[Any], collapsed: bool | None = None
+    ) -> pn.Card:
         """Return a card, which is collapsed if a selector is its only content."""
         is_collapsed = len(widgets) == 1 if collapsed is None else collapsed
         return pn.Card(
@@ -185,82 +197,104 @@ class SceneControls:
             margin=(2, 0),
         )  # fmt: skip
 
-    def _slot_widgets(self, slot: Any) -> list[Any]:
+    def _create_slot_widgets(self, slot: Any) -> list[Any]:
         """Return the selector of a slot and the widgets of the selected part."""
-        name = self.part_of_slot(slot)
+        name = self.find_part_name_of_slot(slot)
         options = [*slot.built_in_parts, *slot.user_parts]
-        options += [PROTOCOL] if slot.name == "loading" and PROTOCOL not in options else []
+        options += (
+            [PROTOCOL_LOADING_NAME]
+            if slot.name == "loading" and PROTOCOL_LOADING_NAME not in options
+            else []
+        )
         selector = pn.widgets.Select(label=slot.name, options=options, value=name, width=265)
-        selector.param.watch(lambda event: self._choose_part(slot, event.new), "value")
+        selector.param.watch(lambda event: self._select_part(slot, event.new), "value")
         widgets = [selector]
-        if name == PROTOCOL:
-            return [*widgets, self._protocol_box()]
+        if name == PROTOCOL_LOADING_NAME:
+            return [*widgets, self._create_protocol_text_box()]
         part = {**slot.built_in_parts, **slot.user_parts}[name]
-        return widgets + self._fields(part, SceneFields.names_of_part(part))
+        return widgets + self._create_field_widgets(part, SceneFields.list_names_of_part(part))
 
-    def _fields(self, part: Any, names: tuple[str, ...]) -> list[Any]:
+    def _create_field_widgets(self, part: Any, field_names: tuple[str, ...]) -> list[Any]:
         """Return the widgets of the fields of a part that apply to the scene."""
-        absent = SceneFields.find_inapplicable(self.settings.scene) | self._fields_of_rig()
+        absent = (
+            SceneFields.find_inapplicable_fields(self.settings.scene)
+            | self._find_fields_without_widget()
+        )
         if self.settings.scene.get("normal_stress") == "constant":
             absent |= {"normal_stress_step"}
         alternative = "stiffness" if "stiffness" not in self.settings.scene else "stiffness_ratio"
         return [
-            self._field_widget(part, name) for name in names if name not in absent | {alternative}
+            self._create_field_widget(part, name)
+            for name in field_names
+            if name not in absent | {alternative}
         ]
 
-    def _fields_of_rig(self) -> set[str]:
+    def _find_fields_without_widget(self) -> set[str]:
         """Return the fields that the rig or a menu sets, and that need no widget."""
         if self._rig is None:
             return {"inertia"}
-        return _FIELDS_OF_RIG - (set() if "stiffness" in self.settings.rig else _STIFFNESS)
+        return _FIELDS_DERIVED_FROM_RIG - (
+            set() if "stiffness" in self.settings.rig else _STIFFNESS_FIELDS
+        )
 
-    def _field_widget(self, part: Any, field: str) -> Any:
+    def _create_field_widget(self, part: Any, field_name: str) -> Any:
         """Return the widget of a field."""
-        declared = part.__dataclass_fields__[field]
+        declared = part.__dataclass_fields__[field_name]
         about, default = declared.metadata["about"], declared.default
-        name = rig_name(field) if self._rig else field
-        stated = self.settings.scene.get(name, self.settings.scene.get(field))
+        name = find_dimensional_field_name(field_name) if self._rig else field_name
+        stated = self.settings.scene.get(name, self.settings.scene.get(field_name))
         if isinstance(default, bool):
-            box = pn.widgets.Checkbox(label=field, value=bool(stated))
-            box.param.watch(lambda event: self._set_field(field, event.new or None), "value")
+            box = pn.widgets.Checkbox(label=field_name, value=bool(stated))
+            box.param.watch(
+                lambda event: self._store_field_value(field_name, event.new or None), "value"
+            )
             return box
-        scale = scale_in_units(self._rig, about["scale"]) if self._rig and about["scale"] else 1.0
-        unit = UNITS_BY_SCALE[about["scale"]] if self._rig and about["scale"] else ""
-        typical = (default or _TYPICAL_VALUES.get(field, 1.0)) * scale
-        limits = SliderRange.of_field(
+        scale = (
+            convert_scale_to_display_units(self._rig, about["scale"])
+            if self._rig and about["scale"]
+            else 1.0
+        )
+        unit = DISPLAY_UNITS_BY_SCALE[about["scale"]] if self._rig and about["scale"] else ""
+        typical = (default or _TYPICAL_VALUE_BY_FIELD.get(field_name, 1.0)) * scale
+        limits = SliderRange.choose_for_field(
             default or 0.0, typical, declared.metadata["rule"], about["scale"]
         )
         number = default if stated is None else float(str(stated).partition(" ")[0])
         shown = number * scale if stated is None and number is not None else number
         return NumberWidget(
             name, unit or about["scale"], shown, limits,
-            lambda value: self._set_field(
+            lambda value: self._store_field_value(
                 name, f"{value!r} {unit}" if unit and value is not None else value
             ),
             about["long_name"],
         ).row  # fmt: skip
 
-    def _rig_widgets(self) -> list[Any]:
+    def _create_rig_widgets(self) -> list[Any]:
         """Return the widgets of the quantities of the rig."""
-        return list(map(self._rig_widget, self.settings.rig))
+        return list(map(self._create_rig_quantity_widget, self.settings.rig))
 
-    def _rig_widget(self, name: str) -> Any:
+    def _create_rig_quantity_widget(self, quantity_name: str) -> Any:
         """Return the widget of a quantity of the rig."""
-        number, _, unit = self.settings.rig[name].partition(" ")
-        typical = float(_TYPICAL_RIG_QUANTITIES.get(name, number).partition(" ")[0])
-        limits = SliderRange.of_field(typical, typical, POSITIVE, "rig")
+        number, _, unit = self.settings.rig[quantity_name].partition(" ")
+        typical = float(_TYPICAL_VALUE_BY_RIG_QUANTITY.get(quantity_name, number).partition(" ")[0])
+        limits = SliderRange.choose_for_field(typical, typical, POSITIVE, "rig")
 
         def change(value: float | None) -> None:
             if value is not None:
-                rig = self.settings.rig | {name: f"{value!r} {unit}"}
+                rig = self.settings.rig | {quantity_name: f"{value!r} {unit}"}
                 self.settings = replace(self.settings, rig=rig)
                 self._changed()
 
         return NumberWidget(
-            name, unit, float(number), limits, change, Rig.QUANTITIES[name].meaning
+            quantity_name,
+            unit,
+            float(number),
+            limits,
+            change,
+            Rig.QUANTITIES[quantity_name].meaning,
         ).row
 
-    def _protocol_box(self) -> Any:
+    def _create_protocol_text_box(self) -> Any:
         """Return the text box with the segments of the loading."""
         box = pn.widgets.TextAreaInput(
             label="Segments (CSV)", value=self.settings.protocol, rows=7, width=265
@@ -273,7 +307,7 @@ class SceneControls:
         box.param.watch(change, "value")
         return box
 
-    def _set_field(self, name: str, value: Any) -> None:
+    def _store_field_value(self, field_name: str, value: Any) -> None:
         """Store the value of a field."""
-        self.settings = self.settings.with_field(name, value)
+        self.settings = self.settings.with_changed_field(field_name, value)
         self._changed()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from rsfstudy.explorer.scene_settings import README_RIG, SceneSettings
+from rsfstudy.explorer.scene_settings import README_RIG_QUANTITIES, SceneSettings
 
-_PROTOCOL_OF_README = """velocity (um/s), distance (um), duration (min)
+_README_PROTOCOL_CSV = """velocity (um/s), distance (um), duration (min)
 10, 300,
 1, 300,
 0,, 10
@@ -14,7 +14,7 @@ _PROTOCOL_OF_README = """velocity (um/s), distance (um), duration (min)
 """
 #: Parameters that the figures of doi:10.1007/s11589-014-0098-4 have in common are the default
 #: values of ``Scene``.
-_FIGURES: dict[str, dict[str, Any]] = {
+_SCENE_FIELDS_BY_PAPER_FIGURE: dict[str, dict[str, Any]] = {
     "Fig. 5: velocity step below the boundary": {
         "law": "slip", "stiffness_ratio": 1.0, "load_velocity_ratio": 1.6,
     },
@@ -41,22 +41,30 @@ _FIGURES: dict[str, dict[str, Any]] = {
         "law": "slowness", "stiffness_ratio": 1.0, "load_velocity_ratio": 200.0, "inertia": True,
     },
 }  # fmt: skip
-_FRICTION_OF_README = {"law": "slowness", "normal_stress": "constant", "a": 0.01, "b_over_a": 1.4}
+_README_FRICTION_FIELDS = {
+    "law": "slowness",
+    "normal_stress": "constant",
+    "a": 0.01,
+    "b_over_a": 1.4,
+}
 #: Settings by the label of the preset.
-PRESETS: dict[str, SceneSettings] = {
+SETTINGS_BY_PRESET_LABEL: dict[str, SceneSettings] = {
     "README: velocity steps and a hold": SceneSettings(
-        _FRICTION_OF_README, README_RIG, _PROTOCOL_OF_README
+        _README_FRICTION_FIELDS, README_RIG_QUANTITIES, _README_PROTOCOL_CSV
     ),
     "README: velocity step": SceneSettings(
-        _FRICTION_OF_README | {"load_velocity": "10 um/s"}, README_RIG, duration="60 s"
+        _README_FRICTION_FIELDS | {"load_velocity": "10 um/s"},
+        README_RIG_QUANTITIES,
+        duration="60 s",
     ),
     "README: stick-slip": SceneSettings(
-        _FRICTION_OF_README | {"load_velocity": "10 um/s"},
-        README_RIG | {"normal_stress": "100 MPa", "stiffness": "0.03 MPa/um", "period": "10 ms"},
+        _README_FRICTION_FIELDS | {"load_velocity": "10 um/s"},
+        README_RIG_QUANTITIES
+        | {"normal_stress": "100 MPa", "stiffness": "0.03 MPa/um", "period": "10 ms"},
         duration="200 s",
     ),
     **{
         label: SceneSettings({"law": "slip", "normal_stress": "variable"} | fields)
-        for label, fields in _FIGURES.items()
+        for label, fields in _SCENE_FIELDS_BY_PAPER_FIGURE.items()
     },
 }

@@ -23,24 +23,24 @@ from rsfstudy.rig import DatasetUnits, Rig, read_protocol
 from rsfstudy.slider import Scene, SceneFields
 
 #: Name of the choice of loading whose segments are a table.
-PROTOCOL = "protocol"
+PROTOCOL_LOADING_NAME = "protocol"
 #: Units of rigs on the page, by the scale of a scene field.
-UNITS_BY_SCALE = {
+DISPLAY_UNITS_BY_SCALE = {
     "sigma_*": "MPa", "D_c": "um", "V_*": "um/s", "D_c/V_*": "s", "sigma_*/D_c": "MPa/um",
     "V_*/D_c": "1/s",
 }  # fmt: skip
 #: SI value of each unit.
-_SI_VALUES = {"MPa": 1e6, "um": 1e-6, "um/s": 1e-6, "s": 1.0, "MPa/um": 1e12, "1/s": 1.0}
+_SI_VALUE_BY_UNIT = {"MPa": 1e6, "um": 1e-6, "um/s": 1e-6, "s": 1.0, "MPa/um": 1e12, "1/s": 1.0}
 #: Rig of the README, which is the default in units of a rig.
-README_RIG = {
+README_RIG_QUANTITIES = {
     "normal_stress": "5 MPa",
     "slip_distance": "10 um",
     "reference_velocity": "1 um/s",
     "stiffness": "0.05 MPa/um",
 }
 #: Number of characters of the arguments above which a call is written on several lines.
-_LONG_CALL = 70
-QUANTITY_BY_FIELD = {quantity.name: quantity for quantity in SceneFields.QUANTITIES}
+_MAX_ARGUMENT_LENGTH_OF_ONE_LINE_CALL = 70
+QUANTITY_BY_SCENE_FIELD = {quantity.name: quantity for quantity in SceneFields.QUANTITIES}
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class SceneSettings:
     duration: str = ""
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> Self:
+    def from_widget_state(cls, widget_state: Mapping[str, Any]) -> Self:
         """Create settings from the state of a view.
 
         Parameters
@@ -84,13 +84,13 @@ class SceneSettings:
             If a name is unknown, or if a value has the wrong type.
         """
         kinds = {each.name: type(getattr(cls(), each.name)) for each in fields(cls)}
-        for name, value in state.items():
+        for name, value in widget_state.items():
             if name not in kinds:
                 raise InvalidValue("state", name, "is unknown", choices=kinds)
             if not isinstance(value, kinds[name]):
                 rule = f"must be {'an object' if kinds[name] is dict else 'a text'}"
                 raise InvalidValue(f"state: {name}", value, rule)
-        return cls(**state)
+        return cls(**widget_state)
 
     @classmethod
     def from_scene(cls, scene: Scene, rig: Rig | None = None) -> Self:
@@ -108,7 +108,7 @@ class SceneSettings:
         SceneSettings
             Settings with the values that differ from the default values.
         """
-        described, defaults = scene.describe(), SceneFields.defaults()
+        described, defaults = scene.describe(), SceneFields.collect_defaults()
         values = {
             name: value
             for name, value in described.items()
@@ -117,30 +117,30 @@ class SceneSettings:
         }
         protocol = ""
         if values.pop("loading", None) is not None:
-            protocol = format_protocol(described.get("segments"))
+            protocol = format_protocol_as_csv(described.get("segments"))
         values = {"law": scene.law, "normal_stress": scene.normal_stress} | values
         if rig is None:
             return cls(values, protocol=protocol)
-        derived = _fields_of_rig(rig)
+        derived = _find_fields_derived_from_rig(rig)
         quantities = {
             name: f"{value:.12g} {unit}"
             for name, (value, unit) in Rig.convert_quantities_for_display(rig.as_dict()).items()
         }
         converted = {
-            rig_name(name): with_rig_units(rig, name, value)
+            find_dimensional_field_name(name): format_value_in_rig_units(rig, name, value)
             for name, value in values.items()
             if name not in derived
         }
         return cls(converted, quantities, protocol=protocol)
 
-    def as_state(self) -> dict[str, Any]:
+    def as_widget_state(self) -> dict[str, Any]:
         """Return the settings as plain values, without empty settings."""
         return {name: value for name, value in asdict(self).items() if value}
 
-    def with_field(self, name: str, value: Any) -> Self:
+    def with_changed_field(self, field_name: str, value: Any) -> Self:
         """Return settings in which a field is changed, or removed if the value is None."""
-        changed = {n: v for n, v in self.scene.items() if n != name}
-        return replace(self, scene=changed if value is None else changed | {name: value})
+        changed = {n: v for n, v in self.scene.items() if n != field_name}
+        return replace(self, scene=changed if value is None else changed | {field_name: value})
 
     # ---- computation ----------------------------------------------------------------------------
 
@@ -161,7 +161,9 @@ class SceneSettings:
         Scene
             Scene of the settings.
         """
-        values = dict(SceneFields.replace_names_by_user_parts(self.scene, _find_user_parts()))
+        values = dict(
+            SceneFields.replace_names_by_user_parts(self.scene, _find_user_defined_parts())
+        )
         if self.protocol:
             with tempfile.TemporaryDirectory() as directory:
                 path = Path(directory, "protocol.csv")
@@ -188,64 +190,68 @@ class SceneSettings:
         if self.duration:
             duration = rig.dimensionless(self.duration, name="duration") if rig else None
             duration = _parse_number("duration", self.duration) if rig is None else duration
-        return simulate(scene, duration=duration, engine=fastest_engine())
+        return simulate(scene, duration=duration, engine=choose_fastest_engine())
 
     # ---- reproduction ---------------------------------------------------------------------------
 
-    def python_code(self) -> str:
+    def write_python_code(self) -> str:
         """Return Python code that computes and saves the motion."""
-        lines, values = ["import rsfstudy", ""], quote_values(self.scene)
-        for name, part in _find_user_parts().items():
-            for slot in [slot for slot in SceneFields.SLOT_NAMES if self.scene.get(slot) == name]:
+        lines, values = ["import rsfstudy", ""], format_values_as_python_code(self.scene)
+        for name, part in _find_user_defined_parts().items():
+            for slot in [
+                slot for slot in SceneFields.PART_SLOT_NAMES if self.scene.get(slot) == name
+            ]:
                 values[slot] = getattr(part, "__name__", name)
                 lines.append(f"# Define or import the class {values[slot]} here.")
         rig_argument = ", rig" if self.rig else ""
         if self.rig:
-            lines.append(f"rig = {format_call('rsfstudy.Rig', quote_values(self.rig))}")
+            lines.append(
+                f"rig = {format_python_call('rsfstudy.Rig', format_values_as_python_code(self.rig))}"
+            )
         if self.protocol:
             lines.insert(0, "from pathlib import Path\n")
             lines.append(f'Path("protocol.csv").write_text("""{self.protocol}""")')
             lines.append(f'test = rsfstudy.read_protocol("protocol.csv"{rig_argument})')
             values["loading"] = "test"
         make = "rig.scene" if self.rig else "rsfstudy.Scene"
-        lines.append(f"scene = {format_call(make, values)}")
-        lines.append(f"motion = rsfstudy.simulate(scene{self._duration_argument()})")
+        lines.append(f"scene = {format_python_call(make, values)}")
+        lines.append(f"motion = rsfstudy.simulate(scene{self._format_simulate_arguments()})")
         lines.append(f'rsfstudy.plot_motion(motion{rig_argument}).savefig("motion.png", dpi=300)')
         if self.rig:
-            units = quote_values(DatasetUnits.DISPLAY_UNITS)
-            lines.append(f"motion = {format_call('rig.in_units', units, 'motion')}")
+            units = format_values_as_python_code(DatasetUnits.DISPLAY_UNITS)
+            lines.append(f"motion = {format_python_call('rig.in_units', units, 'motion')}")
         lines.append('motion.to_netcdf("motion.nc")')
         lines.append('print(f"k/k_cr = {scene.stiffness_ratio:.6g}")')
         lines.append('print(f"peak friction {float(motion.friction_coefficient.max()):.6g}")')
         return "\n".join(lines)
 
-    def _duration_argument(self) -> str:
+    def _format_simulate_arguments(self) -> str:
         """Return the arguments of ``rsfstudy.simulate`` after the scene."""
-        engine = f', engine="{fastest_engine()}"'
+        engine = f', engine="{choose_fastest_engine()}"'
         if not self.duration:
             return engine
         text = f"rig.dimensionless({json.dumps(self.duration)})" if self.rig else self.duration
         return f", duration={text}{engine}"
 
-    def command_line(self) -> str:
+    def write_command_line(self) -> str:
         """Return the command line that computes and saves the motion."""
         options = [f"--{name.replace('_', '-')}={value}" for name, value in self.rig.items()]
         options += [f"--set={name}={value}" for name, value in self.scene.items()]
         options += ["--protocol=protocol.csv"] if self.protocol else []
         options += [f"--duration={self.duration}"] if self.duration else []
-        options += [f"--engine={fastest_engine()}", "--output=motion.png"]
+        options += [f"--engine={choose_fastest_engine()}", "--output=motion.png"]
         command = shlex.join(["rsfstudy", "simulate", *options])
         if self.protocol:
             return f"cat > protocol.csv << 'END'\n{self.protocol.strip()}\nEND\n{command}"
         return command
 
 
-def fastest_engine() -> str:
+def choose_fastest_engine() -> str:
     """Return the compiled engine if Numba is installed, and SciPy otherwise."""
     return "compiled" if find_spec("numba") else "scipy"
 
 
-def quote_values(values: Mapping[str, Any]) -> dict[str, str]:
+def format_values_as_python_code(values: Mapping[str, Any]) -> dict[str, str]:
     """Return values as Python code, with double quotes."""
     return {
         name: json.dumps(value, ensure_ascii=False)
@@ -255,15 +261,15 @@ def quote_values(values: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def format_call(function: str, keywords: Mapping[str, str], *arguments: str) -> str:
+def format_python_call(function_name: str, keywords: Mapping[str, str], *arguments: str) -> str:
     """Return a call as Python code, with one argument per line if the call is long."""
     parts = [*arguments, *(f"{name}={value}" for name, value in keywords.items())]
-    if sum(map(len, parts)) < _LONG_CALL:
-        return f"{function}({', '.join(parts)})"
-    return f"{function}(\n" + "".join(f"    {part},\n" for part in parts) + ")"
+    if sum(map(len, parts)) < _MAX_ARGUMENT_LENGTH_OF_ONE_LINE_CALL:
+        return f"{function_name}({', '.join(parts)})"
+    return f"{function_name}(\n" + "".join(f"    {part},\n" for part in parts) + ")"
 
 
-def format_protocol(segments: Any) -> str:
+def format_protocol_as_csv(segments: Any) -> str:
     """Return the table of the segments of a protocol.
 
     Parameters
@@ -297,14 +303,14 @@ def format_protocol(segments: Any) -> str:
     return "\n".join(lines) + "\n"
 
 
-def rig_name(field_name: str) -> str:
+def find_dimensional_field_name(field_name: str) -> str:
     """Return the name of a field in rig units, such as ``load_velocity``."""
-    quantity = QUANTITY_BY_FIELD.get(field_name)
+    quantity = QUANTITY_BY_SCENE_FIELD.get(field_name)
     is_velocity = quantity is not None and quantity.scale == "V_*" and "_ratio" in field_name
     return field_name.removesuffix("_ratio") if is_velocity else field_name
 
 
-def with_rig_units(rig: Rig, field_name: str, value: Any) -> Any:
+def format_value_in_rig_units(rig: Rig, field_name: str, value: Any) -> Any:
     """Format the value of a field with rig units.
 
     Parameters
@@ -321,24 +327,26 @@ def with_rig_units(rig: Rig, field_name: str, value: Any) -> Any:
     object
         Text with units. A value without a scale is returned unchanged.
     """
-    quantity = QUANTITY_BY_FIELD.get(field_name)
+    quantity = QUANTITY_BY_SCENE_FIELD.get(field_name)
     if quantity is None or not quantity.scale or isinstance(value, bool | str):
         return value
-    unit = UNITS_BY_SCALE[quantity.scale]
-    return f"{value * scale_in_units(rig, quantity.scale):.12g} {unit}"
+    unit = DISPLAY_UNITS_BY_SCALE[quantity.scale]
+    return f"{value * convert_scale_to_display_units(rig, quantity.scale):.12g} {unit}"
 
 
-def scale_in_units(rig: Rig, scale: str) -> float:
+def convert_scale_to_display_units(rig: Rig, scale_name: str) -> float:
     """Return a rig scale in the units shown on the page."""
-    return float(rig.scales[scale].factor) / _SI_VALUES[UNITS_BY_SCALE[scale]]
+    return (
+        float(rig.scales[scale_name].factor) / _SI_VALUE_BY_UNIT[DISPLAY_UNITS_BY_SCALE[scale_name]]
+    )
 
 
-def _find_user_parts() -> dict[str, Any]:
+def _find_user_defined_parts() -> dict[str, Any]:
     """Return the user-defined parts that this process has used, by name."""
-    return {name: part for slot in SceneFields.SLOTS for name, part in slot.user_parts.items()}
+    return {name: part for slot in SceneFields.PART_SLOTS for name, part in slot.user_parts.items()}
 
 
-def _fields_of_rig(rig: Rig) -> set[str]:
+def _find_fields_derived_from_rig(rig: Rig) -> set[str]:
     """Return the names of the fields that are computed from rig quantities."""
     plain = Scene().as_dict()
     of_rig = rig.scene(normal_stress=plain["normal_stress"]).as_dict()

@@ -16,12 +16,12 @@ from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure as bokeh_figure
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.explorer.jobs import Report
+from rsfstudy.explorer.jobs import ReportProgressFunction
 from rsfstudy.explorer.messages import escape_markdown
 from rsfstudy.explorer.scene_controls import SceneControls
-from rsfstudy.explorer.scene_presets import PRESETS
+from rsfstudy.explorer.scene_presets import SETTINGS_BY_PRESET_LABEL
 from rsfstudy.explorer.scene_settings import SceneSettings
-from rsfstudy.explorer.view import View
+from rsfstudy.explorer.view import ExplorerView
 from rsfstudy.plots import Figure, plot_motion
 from rsfstudy.reporting import TextTable, build_motion_tables_and_sentences
 from rsfstudy.rig import DatasetUnits, Rig
@@ -32,16 +32,16 @@ from rsfstudy.slider import Scene
 _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#555555"
 #: Number of slip rates of the line of steady sliding, and its extension in decades.
 _STEADY_POINTS, _STEADY_EXTENSION = 201, 0.3
-_NO_PRESET = "own settings"
-_PLOT_HEIGHT = 330
+_LABEL_OF_NO_PRESET = "own settings"
+_PLOT_HEIGHT_PIXELS = 330
 #: Style of the plots, which are in two columns if the page is wide enough.
-_GRID_STYLE = {
+_TWO_COLUMN_GRID_STYLE = {
     "display": "grid",
     "grid-template-columns": "repeat(auto-fit, minmax(400px, 1fr))",
 }
 
 
-class Result(NamedTuple):
+class ComputedMotion(NamedTuple):
     """Motion of a scene, with the sentences that describe it.
 
     Parameters
@@ -61,11 +61,11 @@ class Result(NamedTuple):
     rig: Rig | None
     scene: Scene
     motion: xr.Dataset
-    shown: xr.Dataset
-    summary: list[Any]
+    displayed_motion: xr.Dataset
+    tables_and_sentences: list[Any]
 
     @classmethod
-    def compute(cls, settings: SceneSettings) -> Result:
+    def compute_from_settings(cls, settings: SceneSettings) -> ComputedMotion:
         """Compute the motion of a scene.
 
         Parameters
@@ -88,21 +88,21 @@ class Result(NamedTuple):
         return cls(rig, scene, motion, shown[0], list(summary))
 
     @property
-    def verdict(self) -> str:
+    def stability_summary(self) -> str:
         """Sentences about the stability of steady sliding and the end of the motion."""
-        sentences = [text for text in self.summary if isinstance(text, str)]
+        sentences = [text for text in self.tables_and_sentences if isinstance(text, str)]
         status, message = self.motion.attrs["status"], self.motion.attrs["message"]
         ending = "" if status == "ok" else f" Motion: {status}. {message}"
         ratio = f"k/k_cr = {self.scene.stiffness_ratio:.6g}"
         return f"{ratio}: {sentences[0]}.{ending}"
 
     @property
-    def peaks(self) -> str:
+    def peak_values_text(self) -> str:
         """Peak friction and peak slip rate of the motion."""
-        values = next(each for each in self.summary if isinstance(each, Mapping))
+        values = next(each for each in self.tables_and_sentences if isinstance(each, Mapping))
         return "; ".join(f"{name}: {text}" for name, text in values.items())
 
-    def columns(self) -> dict[str, np.ndarray]:
+    def build_plot_columns(self) -> dict[str, np.ndarray]:
         """Return the columns of the plots.
 
         Returns
@@ -117,14 +117,14 @@ class Result(NamedTuple):
         )
         fault = self.motion["frictional_stress"] / self.motion[stress_name]
         return {
-            "time": self.shown["time"].values,
-            "displacement": self.shown["load_point_displacement"].values,
-            "friction": self.shown["friction_coefficient"].values,
-            "rate": self._rates(self.motion["log10_slip_rate"].values),
+            "time": self.displayed_motion["time"].values,
+            "displacement": self.displayed_motion["load_point_displacement"].values,
+            "friction": self.displayed_motion["friction_coefficient"].values,
+            "rate": self._convert_log10_slip_rates(self.motion["log10_slip_rate"].values),
             "fault": fault.values,
         }
 
-    def steady_line(self) -> dict[str, np.ndarray]:
+    def compute_steady_friction_line(self) -> dict[str, np.ndarray]:
         """Return steady-state friction over the slip rate range of the motion.
 
         Returns
@@ -141,15 +141,18 @@ class Result(NamedTuple):
             for rate in rates.tolist()
         ]
         friction = np.array([math.nan if each is None else each for each in excess], float)
-        return {"rate": self._rates(rates), "friction": self.scene.mu_star + friction}
+        return {
+            "rate": self._convert_log10_slip_rates(rates),
+            "friction": self.scene.mu_star + friction,
+        }
 
-    def _rates(self, log10_rates: np.ndarray) -> np.ndarray:
+    def _convert_log10_slip_rates(self, log10_slip_rates: np.ndarray) -> np.ndarray:
         """Return slip rates in the units of the page."""
         scale = self.rig.reference_velocity * 1e6 if self.rig else 1.0
-        return np.asarray(scale * 10.0 ** np.minimum(log10_rates, 300.0))
+        return np.asarray(scale * 10.0 ** np.minimum(log10_slip_rates, 300.0))
 
 
-class SceneView(View):
+class SceneView(ExplorerView):
     """View of a scene with its stability, its motion and its phase plane.
 
     Parameters
@@ -160,21 +163,27 @@ class SceneView(View):
     """
 
     title = "Scene"
-    file_stem = "motion"
+    download_file_stem = "motion"
 
     def __init__(self, source: Any = None) -> None:
         """Create the widgets and the plots."""
         super().__init__(source)
-        self._result: Result | None = None
-        self._preset = pn.widgets.Select(label="Preset", options=[_NO_PRESET, *PRESETS], width=275)
-        self._preset.value = next(iter(PRESETS)) if source is None else _NO_PRESET
-        self._preset.param.watch(lambda event: self._choose_preset(event.new), "value")
+        self._result: ComputedMotion | None = None
+        self._preset = pn.widgets.Select(
+            label="Preset", options=[_LABEL_OF_NO_PRESET, *SETTINGS_BY_PRESET_LABEL], width=275
+        )
+        self._preset.value = (
+            next(iter(SETTINGS_BY_PRESET_LABEL)) if source is None else _LABEL_OF_NO_PRESET
+        )
+        self._preset.param.watch(lambda event: self._show_preset(event.new), "value")
         self._duration = pn.widgets.TextInput(
             label="Duration (empty: whole loading)", width=270, placeholder="such as 60 s, or 50"
         )
-        self._controls = SceneControls(_read_settings(source), self._settings_changed)
+        self._controls = SceneControls(
+            _create_settings_from_source(source), self._handle_changed_settings
+        )
         self._duration.value = self._controls.settings.duration
-        self._duration.param.watch(lambda _event: self._settings_changed(), "value")
+        self._duration.param.watch(lambda _event: self._handle_changed_settings(), "value")
         self._verdict = pn.pane.Markdown("", sizing_mode="stretch_width", margin=(0, 5))
         self._peaks = pn.pane.Markdown("", sizing_mode="stretch_width", margin=(0, 5))
         self._events = pn.Column(sizing_mode="stretch_width")
@@ -183,135 +192,139 @@ class SceneView(View):
         )
         self._start_source = ColumnDataSource({"rate": [], "fault": []})
         self._steady_source = ColumnDataSource({"rate": [], "friction": []})
-        self._figures = self._draw_figures()
-        self._compute()
+        self._figures = self._create_empty_figures()
+        self._start_computation()
 
     # ---- interface of View ----------------------------------------------------------------------
 
-    def controls(self) -> list[Any]:
+    def list_control_widgets(self) -> list[Any]:
         """Return the preset, the fields of the scene and the duration."""
         return [self._preset, self._controls.column, self._duration]
 
-    def plots(self) -> list[Any]:
+    def list_plot_panes(self) -> list[Any]:
         """Return the verdict and the four plots."""
         grid = pn.Column(
             *map(pn.pane.Bokeh, self._figures.values()),
-            sizing_mode="stretch_width", styles=_GRID_STYLE,
+            sizing_mode="stretch_width", styles=_TWO_COLUMN_GRID_STYLE,
         )  # fmt: skip
         return [self._verdict, self._peaks, grid]
 
-    def status(self) -> list[Any]:
+    def build_status_tables(self) -> list[Any]:
         """Return the table of the events of the motion."""
         return [self._events]
 
-    def state(self) -> dict[str, Any]:
+    def get_widget_state(self) -> dict[str, Any]:
         """Return the settings of the scene."""
-        return self._controls.settings.as_state()
+        return self._controls.settings.as_widget_state()
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
+    def set_widget_state(self, widget_state: Mapping[str, Any]) -> None:
         """Show other settings."""
-        self._show_settings(SceneSettings.from_state(state))
+        self._show_settings_and_compute(SceneSettings.from_widget_state(widget_state))
 
-    def python_code(self) -> str:
+    def write_python_code(self) -> str:
         """Return Python code that computes the motion."""
-        return self._controls.settings.python_code()
+        return self._controls.settings.write_python_code()
 
-    def command_line(self) -> str:
+    def write_command_line(self) -> str:
         """Return a command line that computes the motion."""
-        return self._controls.settings.command_line()
+        return self._controls.settings.write_command_line()
 
-    def figure(self) -> Figure:
+    def draw_figure_for_download(self) -> Figure:
         """Return the figure of the motion."""
-        result = self._require_result()
+        result = self._require_computed_motion()
         return plot_motion(result.motion, result.rig)
 
-    def table(self) -> pd.DataFrame:
+    def build_table_for_download(self) -> pd.DataFrame:
         """Return the motion with one row per time."""
-        return self._require_result().shown.to_dataframe().reset_index()
+        return self._require_computed_motion().displayed_motion.to_dataframe().reset_index()
 
-    def dataset(self) -> xr.Dataset:
+    def build_dataset_for_download(self) -> xr.Dataset:
         """Return the motion in the units of the page."""
-        return self._require_result().shown
+        return self._require_computed_motion().displayed_motion
 
     # ---- changes --------------------------------------------------------------------------------
 
-    def _require_result(self) -> Result:
+    def _require_computed_motion(self) -> ComputedMotion:
         """Return the result of the last computation."""
         if self._result is None:
             remedy = "Change a setting, and wait until the curves appear."
             raise InvalidValue("motion", None, "has not been computed", remedy=remedy)
         return self._result
 
-    def _choose_preset(self, label: str) -> None:
+    def _show_preset(self, preset_label: str) -> None:
         """Show the settings of a preset."""
-        if label in PRESETS:
-            self._show_settings(PRESETS[label])
+        if preset_label in SETTINGS_BY_PRESET_LABEL:
+            self._show_settings_and_compute(SETTINGS_BY_PRESET_LABEL[preset_label])
 
-    def _show_settings(self, settings: SceneSettings) -> None:
+    def _show_settings_and_compute(self, settings: SceneSettings) -> None:
         """Show settings in the widgets, and compute the motion."""
         settings.build_scene(settings.build_rig())  # raises an error before the widgets change
-        self._controls.show(settings)
+        self._controls.rebuild_widgets(settings)
         if self._duration.value == settings.duration:
-            self._compute()
+            self._start_computation()
         else:
             self._duration.value = settings.duration  # which computes the motion
 
-    def _settings_changed(self) -> None:
+    def _handle_changed_settings(self) -> None:
         """Compute the motion again after a setting has changed."""
         duration = self._duration.value.strip()
         self._controls.settings = replace(self._controls.settings, duration=duration)
-        if self._controls.settings != PRESETS.get(self._preset.value):
-            self._preset.value = _NO_PRESET
-        self._compute()
+        if self._controls.settings != SETTINGS_BY_PRESET_LABEL.get(self._preset.value):
+            self._preset.value = _LABEL_OF_NO_PRESET
+        self._start_computation()
 
-    def _compute(self) -> None:
+    def _start_computation(self) -> None:
         """Start the computation of the motion."""
         settings = self._controls.settings
 
-        def compute(_report: Report) -> Result:
-            return Result.compute(settings)
+        def compute(_report: ReportProgressFunction) -> ComputedMotion:
+            return ComputedMotion.compute_from_settings(settings)
 
-        self.jobs.start(compute, self._show_result, self._show_failure, label="Computing")
+        self.jobs.start(
+            compute, self._show_computed_motion, self._show_computation_error, label="Computing"
+        )
 
-    def _show_failure(self, error: Exception) -> None:
+    def _show_computation_error(self, error: Exception) -> None:
         """Show an error, and remove the curves that no longer match the settings."""
         self._result = None
         self._verdict.object = self._peaks.object = ""
         for source in (self._motion_source, self._start_source, self._steady_source):
             source.data = {name: [] for name in source.data}
-        self.refresh()
+        self.update_code_and_url()
         self.show_error(error)
 
-    def _show_result(self, result: Result) -> None:
+    def _show_computed_motion(self, computed_motion: ComputedMotion) -> None:
         """Draw the motion."""
-        self._result = result
+        self._result = computed_motion
         self.hide_error()
-        columns = result.columns()
+        columns = computed_motion.build_plot_columns()
         self._motion_source.data = columns
         self._start_source.data = {name: columns[name][:1] for name in ("rate", "fault")}
-        self._steady_source.data = result.steady_line()
-        self._verdict.object = f"**{escape_markdown(result.verdict)}**"
-        self._peaks.object = escape_markdown(result.peaks)
+        self._steady_source.data = computed_motion.compute_steady_friction_line()
+        self._verdict.object = f"**{escape_markdown(computed_motion.stability_summary)}**"
+        self._peaks.object = escape_markdown(computed_motion.peak_values_text)
         self._events.objects = [
             pn.pane.DataFrame(pd.DataFrame(each.rows), index=False)
-            for each in result.summary
+            for each in computed_motion.tables_and_sentences
             if isinstance(each, TextTable)
-        ] or [pn.pane.Str(str(result.summary[-1]))]
-        time, length, rate = ("s", "µm", "µm/s") if result.rig else ("D_c/V_*", "D_c", "V_*")
+        ] or [pn.pane.Str(str(computed_motion.tables_and_sentences[-1]))]
+        time, length, rate = (
+            ("s", "µm", "µm/s") if computed_motion.rig else ("D_c/V_*", "D_c", "V_*")
+        )
         for name in ("friction_time", "rate_time"):
             self._figures[name].xaxis.axis_label = f"Time ({time})"
         self._figures["displacement"].xaxis.axis_label = f"Load point displacement ({length})"
         self._figures["plane"].xaxis.axis_label = f"Slip rate ({rate})"
         self._figures["rate_time"].yaxis.axis_label = f"Slip rate ({rate})"
-        self.refresh()
+        self.update_code_and_url()
 
     # ---- plots ----------------------------------------------------------------------------------
 
-    def _draw_figures(self) -> dict[str, Any]:
+    def _create_empty_figures(self) -> dict[str, Any]:
         """Create the plots without data."""
         friction = "Friction coefficient"
         shared: dict[str, Any] = {
-            "height": _PLOT_HEIGHT, "sizing_mode": "stretch_width", "min_width": 320,
+            "height": _PLOT_HEIGHT_PIXELS, "sizing_mode": "stretch_width", "min_width": 320,
             "tools": "pan,box_zoom,wheel_zoom,reset,hover", "active_drag": "box_zoom",
             "toolbar_location": "above",
         }  # fmt: skip
@@ -345,10 +358,10 @@ class SceneView(View):
         return figures
 
 
-def _read_settings(source: Any) -> SceneSettings:
+def _create_settings_from_source(source: Any) -> SceneSettings:
     """Return the settings of a scene, a rig or a motion."""
     if source is None:
-        return next(iter(PRESETS.values()))
+        return next(iter(SETTINGS_BY_PRESET_LABEL.values()))
     if isinstance(source, Rig):
         return SceneSettings.from_scene(source.scene(load_velocity_ratio=10.0), source)
     if isinstance(source, xr.Dataset):

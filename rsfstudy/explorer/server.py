@@ -23,14 +23,14 @@ from tornado.routing import Matcher, Rule
 from tornado.web import RequestHandler
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.explorer.jobs import route_warnings_to_pages
-from rsfstudy.explorer.messages import create_message
-from rsfstudy.explorer.view import STATE_ARGUMENT, load_panel
+from rsfstudy.explorer.jobs import redirect_warnings_to_browser_page
+from rsfstudy.explorer.messages import create_error_page
+from rsfstudy.explorer.view import URL_ARGUMENT_OF_WIDGET_STATE, load_panel_extension
 from rsfstudy.explorer.views import create_view
 
 #: Address of the loopback interface, and port that is used by default if it is free.
 HOST, DEFAULT_PORT = "127.0.0.1", 8067
-_TOKEN_ARGUMENT = "token"
+_URL_ARGUMENT_OF_TOKEN = "token"
 
 
 class ExplorerServer:
@@ -57,9 +57,9 @@ class ExplorerServer:
         """Bind the port and start to listen."""
         self.port = _find_free_port(port)
         token = secrets.token_urlsafe(32)
-        load_panel()
+        load_panel_extension()
         self._server: Server = get_server(
-            {"/": lambda: _build_page(source)},
+            {"/": lambda: _build_page_of_view(source)},
             port=self.port,
             address=HOST,
             websocket_origin=f"{HOST}:{self.port}",
@@ -68,14 +68,20 @@ class ExplorerServer:
             show=False,
         )
         rules = [
-            Rule(_FirstRequest(token), _LoginHandler, {"token": token, "port": self.port}),
-            Rule(_UnknownRequest(token, self.port), _RefusalHandler),
+            Rule(
+                _MatcherOfRequestsWithToken(token),
+                _LoginHandler,
+                {"token": token, "port": self.port},
+            ),
+            Rule(_MatcherOfRequestsWithoutCookie(token, self.port), _ForbiddenRequestHandler),
         ]
         self._server._tornado.add_handlers(r".*", rules)  # these rules precede the pages
-        query = {_TOKEN_ARGUMENT: token} | ({STATE_ARGUMENT: state} if state else {})
+        query = {_URL_ARGUMENT_OF_TOKEN: token} | (
+            {URL_ARGUMENT_OF_WIDGET_STATE: state} if state else {}
+        )
         self.url = f"http://{HOST}:{self.port}/?{urlencode(query)}"
 
-    def run(self, *, open_browser: bool, announce: Callable[[str], None]) -> None:
+    def run(self, *, open_browser: bool, announce_address: Callable[[str], None]) -> None:
         """Serve the page until the process is interrupted.
 
         Parameters
@@ -85,9 +91,9 @@ class ExplorerServer:
         announce : callable
             Function that receives the first address when the server is ready.
         """
-        route_warnings_to_pages()
+        redirect_warnings_to_browser_page()
         self._server.start()
-        announce(self.url)
+        announce_address(self.url)
         if open_browser:
             self._server.io_loop.call_later(0.1, webbrowser.open, self.url)
         try:
@@ -96,16 +102,16 @@ class ExplorerServer:
             self._server.stop()
 
 
-def _build_page(source: Any) -> Any:
+def _build_page_of_view(source: Any) -> Any:
     """Build the page of a browser tab, or a page with an error message."""
-    arguments = pn.state.session_args.get(STATE_ARGUMENT, [b""])
+    arguments = pn.state.session_args.get(URL_ARGUMENT_OF_WIDGET_STATE, [b""])
     try:
-        return create_view(source, arguments[0].decode(errors="replace")).panel()
+        return create_view(source, arguments[0].decode(errors="replace")).build_page()
     except Exception as error:
-        return create_message(error)
+        return create_error_page(error)
 
 
-def _find_free_port(port: int | None) -> int:
+def _find_free_port(requested_port: int | None) -> int:
     """Return a free port of the loopback interface.
 
     Raises
@@ -113,22 +119,22 @@ def _find_free_port(port: int | None) -> int:
     InvalidValue
         If the requested port is in use.
     """
-    for candidate in (port,) if port else (DEFAULT_PORT, 0):
+    for candidate in (requested_port,) if requested_port else (DEFAULT_PORT, 0):
         with socket.socket() as tried:
             tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 tried.bind((HOST, candidate))
             except OSError as error:
-                if port:
+                if requested_port:
                     remedy = "Choose another --port, or omit it to use a free port."
                     rule = f"cannot be used ({error.strerror})"
-                    raise InvalidValue("--port", port, rule, remedy=remedy) from error
+                    raise InvalidValue("--port", requested_port, rule, remedy=remedy) from error
                 continue
             return int(tried.getsockname()[1])
     raise AssertionError("the system provides a free port")
 
 
-def _cookie_name(port: int) -> str:
+def _format_cookie_name(port: int) -> str:
     """Return the name of the cookie, which contains the port.
 
     The port is part of the name because a browser sends the cookies of a host to all its ports.
@@ -136,7 +142,7 @@ def _cookie_name(port: int) -> str:
     return f"rsfstudy-explore-{port}"
 
 
-class _FirstRequest(Matcher):
+class _MatcherOfRequestsWithToken(Matcher):
     """Matcher of requests whose address contains the token."""
 
     def __init__(self, token: str) -> None:
@@ -144,15 +150,15 @@ class _FirstRequest(Matcher):
 
     def match(self, request: HTTPServerRequest) -> dict[str, Any] | None:
         """Return an empty dictionary if the request contains the token."""
-        given = request.query_arguments.get(_TOKEN_ARGUMENT, [b""])[0]
+        given = request.query_arguments.get(_URL_ARGUMENT_OF_TOKEN, [b""])[0]
         return {} if hmac.compare_digest(given, self._token) else None
 
 
-class _UnknownRequest(Matcher):
+class _MatcherOfRequestsWithoutCookie(Matcher):
     """Matcher of requests without a valid cookie."""
 
     def __init__(self, token: str, port: int) -> None:
-        self._token, self._cookie = token.encode(), _cookie_name(port)
+        self._token, self._cookie = token.encode(), _format_cookie_name(port)
 
     def match(self, request: HTTPServerRequest) -> dict[str, Any] | None:
         """Return an empty dictionary if the request has no valid cookie."""
@@ -171,15 +177,15 @@ class _LoginHandler(RequestHandler):
     def get(self) -> None:
         """Set the cookie, and redirect to the address without the token."""
         self.set_cookie(
-            _cookie_name(self._port), self._token, httponly=True, samesite="Strict", path="/"
+            _format_cookie_name(self._port), self._token, httponly=True, samesite="Strict", path="/"
         )
         self.set_header("Referrer-Policy", "no-referrer")
         rest = {n: self.get_query_argument(n) for n in self.request.query_arguments}
-        del rest[_TOKEN_ARGUMENT]
+        del rest[_URL_ARGUMENT_OF_TOKEN]
         self.redirect("/" + (f"?{urlencode(rest)}" if rest else ""))
 
 
-class _RefusalHandler(RequestHandler):
+class _ForbiddenRequestHandler(RequestHandler):
     """Handler that refuses all requests."""
 
     def prepare(self) -> None:

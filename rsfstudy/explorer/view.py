@@ -18,27 +18,27 @@ import panel as pn
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.explorer.jobs import Jobs
+from rsfstudy.explorer.jobs import BackgroundJobs
 from rsfstudy.explorer.messages import escape_markdown as escape_markdown
-from rsfstudy.explorer.messages import format_message
+from rsfstudy.explorer.messages import format_error_as_markdown
 from rsfstudy.plots import Figure, render_figure, style_context
 from rsfstudy.storage import write_dataset
 
 #: Name of the argument of the URL that contains the state of a view.
-STATE_ARGUMENT = "state"
+URL_ARGUMENT_OF_WIDGET_STATE = "state"
 #: Width of the column with the widgets in pixels. The plots have the remaining width.
-CONTROLS_WIDTH = 290
-_CODE_STYLE = (
+CONTROL_COLUMN_WIDTH_PIXELS = 290
+_CODE_BOX_STYLESHEET = (
     "textarea.bk-input.bk-input:disabled {font-family: monospace; color: #222; opacity: 1}"
 )
-_COPY_SCRIPT = """
+_COPY_BUTTON_JAVASCRIPT = """
 navigator.clipboard.writeText(source.value)
 button.label = "Copied"
 setTimeout(() => { button.label = "Copy" }, 1500)
 """
 
 
-class View(ABC):
+class ExplorerView(ABC):
     """Base class that adds code, downloads and messages to the widgets of a view.
 
     A subclass creates its widgets in ``__init__``, and implements the abstract methods. The
@@ -59,18 +59,18 @@ class View(ABC):
 
     #: Title of the page, and beginning of the names of downloaded files.
     title = "rsfstudy"
-    file_stem = "rsfstudy"
+    download_file_stem = "rsfstudy"
 
     def __init__(self, source: Any) -> None:
         """Create the parts of the page that all views share."""
         self.source = source
-        self.jobs = Jobs(self.show_warnings)
+        self.jobs = BackgroundJobs(self.show_warnings)
         self._alert = pn.pane.Alert("", alert_type="danger", visible=False)
         self._warnings = pn.pane.Alert("", alert_type="warning", visible=False)
         self._codes = {
             label: pn.widgets.TextAreaInput(
                 label=label, disabled=True, auto_grow=True, max_rows=40, rows=2,
-                sizing_mode="stretch_width", stylesheets=[_CODE_STYLE],
+                sizing_mode="stretch_width", stylesheets=[_CODE_BOX_STYLESHEET],
             )
             for label in ("Python", "Command line", "State")
         }  # fmt: skip
@@ -78,7 +78,7 @@ class View(ABC):
     # ---- methods that subclasses implement ------------------------------------------------------
 
     @abstractmethod
-    def controls(self) -> list[Any]:
+    def list_control_widgets(self) -> list[Any]:
         """Return the widgets in the left column.
 
         Returns
@@ -88,7 +88,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def plots(self) -> list[Any]:
+    def list_plot_panes(self) -> list[Any]:
         """Return the plots in the right column.
 
         Returns
@@ -98,7 +98,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def state(self) -> dict[str, Any]:
+    def get_widget_state(self) -> dict[str, Any]:
         """Return the settings of the widgets.
 
         Returns
@@ -108,7 +108,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def set_state(self, state: Mapping[str, Any]) -> None:
+    def set_widget_state(self, widget_state: Mapping[str, Any]) -> None:
         """Set the widgets to the settings that ``state`` returned.
 
         Parameters
@@ -123,7 +123,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def python_code(self) -> str:
+    def write_python_code(self) -> str:
         """Return Python code that reproduces the numbers of the view.
 
         Returns
@@ -133,7 +133,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def command_line(self) -> str:
+    def write_command_line(self) -> str:
         """Return a command line that reproduces the numbers of the view.
 
         Returns
@@ -143,7 +143,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def figure(self) -> Figure:
+    def draw_figure_for_download(self) -> Figure:
         """Return the figure for a publication.
 
         Returns
@@ -153,7 +153,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def table(self) -> pd.DataFrame:
+    def build_table_for_download(self) -> pd.DataFrame:
         """Return the table of the view.
 
         Returns
@@ -163,7 +163,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def dataset(self) -> xr.Dataset:
+    def build_dataset_for_download(self) -> xr.Dataset:
         """Return the data of the view.
 
         Returns
@@ -172,7 +172,7 @@ class View(ABC):
             Dataset that ``rsfstudy`` reads again.
         """
 
-    def status(self) -> list[Any]:
+    def build_status_tables(self) -> list[Any]:
         """Return the contents of the tab "Status".
 
         Returns
@@ -185,7 +185,7 @@ class View(ABC):
     # ---- state ----------------------------------------------------------------------------------
 
     @classmethod
-    def restore(cls, source: Any, state: Mapping[str, Any]) -> Self:
+    def create_with_widget_state(cls, source: Any, widget_state: Mapping[str, Any]) -> Self:
         """Create a view with the settings of an earlier view.
 
         Parameters
@@ -201,13 +201,13 @@ class View(ABC):
             View of the source.
         """
         view = cls(source)
-        if state:
-            with view.errors_shown():
-                view.set_state(state)
+        if widget_state:
+            with view.show_raised_errors():
+                view.set_widget_state(widget_state)
         return view
 
     @staticmethod
-    def parse_state(text: str | None) -> dict[str, Any]:
+    def parse_widget_state(state_json: str | None) -> dict[str, Any]:
         """Parse the settings of a view.
 
         Parameters
@@ -227,26 +227,28 @@ class View(ABC):
         """
         remedy = "Copy the text from the tab Code of a view."
         try:
-            state = json.loads(text) if text else {}
+            state = json.loads(state_json) if state_json else {}
         except ValueError as error:
-            raise InvalidValue("state", text, "is not JSON", remedy=remedy) from error
+            raise InvalidValue("state", state_json, "is not JSON", remedy=remedy) from error
         if not isinstance(state, dict):
-            raise InvalidValue("state", text, "is not a JSON object", remedy=remedy)
+            raise InvalidValue("state", state_json, "is not a JSON object", remedy=remedy)
         return state
 
     @property
-    def state_text(self) -> str:
+    def widget_state_json(self) -> str:
         """Settings of the widgets as compact JSON."""
-        return json.dumps(self.state(), separators=(",", ":"))
+        return json.dumps(self.get_widget_state(), separators=(",", ":"))
 
-    def refresh(self) -> None:
+    def update_code_and_url(self) -> None:
         """Update the code and the address of the page after the view has changed."""
-        with self.errors_shown():
-            texts = self.python_code(), self.command_line(), self.state_text
+        with self.show_raised_errors():
+            texts = self.write_python_code(), self.write_command_line(), self.widget_state_json
             for box, text in zip(self._codes.values(), texts, strict=True):
                 box.value = text
         if pn.state.location is not None:
-            pn.state.location.search = "?" + urlencode({STATE_ARGUMENT: self.state_text})
+            pn.state.location.search = "?" + urlencode(
+                {URL_ARGUMENT_OF_WIDGET_STATE: self.widget_state_json}
+            )
 
     # ---- messages -------------------------------------------------------------------------------
 
@@ -258,7 +260,7 @@ class View(ABC):
         error : Exception
             Error. An error that rsfstudy does not raise itself is also logged.
         """
-        self._alert.object = format_message(error)
+        self._alert.object = format_error_as_markdown(error)
         self._alert.visible = True
 
     def show_warnings(self, messages: Sequence[str]) -> None:
@@ -277,7 +279,7 @@ class View(ABC):
         self._alert.visible = False
 
     @contextmanager
-    def errors_shown(self) -> Iterator[None]:
+    def show_raised_errors(self) -> Iterator[None]:
         """Show the message of any error that is raised inside a ``with`` block.
 
         Yields
@@ -292,7 +294,7 @@ class View(ABC):
 
     # ---- page -----------------------------------------------------------------------------------
 
-    def panel(self) -> pn.viewable.Viewable:
+    def build_page(self) -> pn.viewable.Viewable:
         """Return the page: widgets on the left, plots and tabs on the right.
 
         Returns
@@ -300,26 +302,28 @@ class View(ABC):
         panel.viewable.Viewable
             Page, which a notebook displays and the server serves.
         """
-        load_panel()
-        controls = pn.Column(*self.controls(), width=CONTROLS_WIDTH, margin=(0, 10, 0, 0))
+        load_panel_extension()
+        controls = pn.Column(
+            *self.list_control_widgets(), width=CONTROL_COLUMN_WIDTH_PIXELS, margin=(0, 10, 0, 0)
+        )
         tabs = pn.Tabs(
-            ("Code", self._code_tab()),
-            ("Download", self._download_tab()),
-            ("Status", pn.Column(*self.status(), sizing_mode="stretch_width")),
+            ("Code", self._build_code_tab()),
+            ("Download", self._build_download_tab()),
+            ("Status", pn.Column(*self.build_status_tables(), sizing_mode="stretch_width")),
             sizing_mode="stretch_width",
         )
         plots = pn.Column(
             self._alert,
             self._warnings,
             self.jobs.indicator,
-            *self.plots(),
+            *self.list_plot_panes(),
             tabs,
             sizing_mode="stretch_width",
         )
-        pn.state.onload(self.refresh)
+        pn.state.onload(self.update_code_and_url)
         if pn.state.curdoc is not None and pn.state.curdoc.session_context is not None:
             pn.config.exception_handler = self.show_error  # of this browser tab only
-            pn.state.curdoc.on_session_destroyed(lambda _context: self.jobs.cancel())
+            pn.state.curdoc.on_session_destroyed(lambda _context: self.jobs.cancel_all())
         return pn.Column(
             pn.pane.Markdown(f"# {escape_markdown(self.title)}", margin=(0, 5)),
             pn.Row(controls, plots, sizing_mode="stretch_width"),
@@ -327,28 +331,30 @@ class View(ABC):
             margin=(0, 15),
         )
 
-    def _code_tab(self) -> pn.Column:
+    def _build_code_tab(self) -> pn.Column:
         """Return the code that reproduces the view, with copy buttons."""
         rows = []
         for text in self._codes.values():
             button = pn.widgets.Button(label="Copy", width=80, margin=(25, 5, 5, 5))
-            button.js_on_click(args={"source": text, "button": button}, code=_COPY_SCRIPT)
+            button.js_on_click(
+                args={"source": text, "button": button}, code=_COPY_BUTTON_JAVASCRIPT
+            )
             rows.append(pn.Row(text, button, sizing_mode="stretch_width"))
         return pn.Column(*rows, sizing_mode="stretch_width")
 
-    def _download_tab(self) -> pn.FlexBox:
+    def _build_download_tab(self) -> pn.FlexBox:
         """Return the download buttons of the view."""
         writers: dict[str, Callable[[], bytes]] = {
             suffix: partial(self._render_figure, suffix) for suffix in ("pdf", "svg", "png")
         }
-        writers |= {"csv": self._encode_table, "nc": self._encode_dataset}
+        writers |= {"csv": self._encode_table_as_csv, "nc": self._encode_dataset_as_netcdf}
         labels = {"csv": "Table (CSV)", "nc": "Data (NetCDF)"}
         return pn.FlexBox(
             *(
                 pn.widgets.FileDownload(
                     label=labels.get(suffix, f"Figure ({suffix.upper()})"),
-                    filename=f"{self.file_stem}.{suffix}",
-                    callback=partial(_write_to_memory, writer),
+                    filename=f"{self.download_file_stem}.{suffix}",
+                    callback=partial(_create_download_buffer, writer),
                     color="primary",
                     width=150,
                 )
@@ -356,28 +362,28 @@ class View(ABC):
             )
         )
 
-    def _render_figure(self, suffix: str) -> bytes:
+    def _render_figure(self, image_format: str) -> bytes:
         """Return the figure as an image."""
         with style_context():
-            return render_figure(self.figure(), suffix)
+            return render_figure(self.draw_figure_for_download(), image_format)
 
-    def _encode_table(self) -> bytes:
+    def _encode_table_as_csv(self) -> bytes:
         """Return the table as a CSV file."""
-        return self.table().to_csv(index=False).encode()
+        return self.build_table_for_download().to_csv(index=False).encode()
 
-    def _encode_dataset(self) -> bytes:
+    def _encode_dataset_as_netcdf(self) -> bytes:
         """Return the dataset as a NetCDF file."""
         with tempfile.TemporaryDirectory() as directory:
-            write_dataset(self.dataset(), path := Path(directory, "data.nc"))
+            write_dataset(self.build_dataset_for_download(), path := Path(directory, "data.nc"))
             return path.read_bytes()
 
 
-def _write_to_memory(write: Callable[[], bytes]) -> io.BytesIO:
+def _create_download_buffer(encode_file: Callable[[], bytes]) -> io.BytesIO:
     """Return the contents of a file that the user downloads."""
-    return io.BytesIO(write())
+    return io.BytesIO(encode_file())
 
 
-def load_panel() -> None:
+def load_panel_extension() -> None:
     """Load the JavaScript of Panel in a notebook, or configure Panel elsewhere.
 
     The resources are loaded from the installed package, so the page does not need an internet

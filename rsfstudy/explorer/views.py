@@ -18,19 +18,19 @@ from rsfstudy.slider import Scene
 from rsfstudy.storage import StoredDataset, read_dataset
 
 if TYPE_CHECKING:
-    from rsfstudy.explorer.view import View
+    from rsfstudy.explorer.view import ExplorerView
 
 #: Class of each view, as module and name. The modules import Panel.
-_VIEW_CLASSES = {
+_MODULE_AND_CLASS_BY_VIEW_KIND = {
     "scene": ("rsfstudy.explorer.scene_view", "SceneView"),
     "results": ("rsfstudy.explorer.results_view", "ResultsView"),
     "record": ("rsfstudy.explorer.record_view", "RecordView"),
 }
 #: Suffixes of results files.
-_RESULTS_SUFFIXES = (".nc", ".nc4", ".zarr")
+_RESULTS_FILE_SUFFIXES = (".nc", ".nc4", ".zarr")
 
 
-def create_view(source: Any = None, state: str | None = None) -> View:
+def create_view(source: Any = None, state: str | None = None) -> ExplorerView:
     """Create the view of a scene, a dataset or a file.
 
     Parameters
@@ -45,13 +45,13 @@ def create_view(source: Any = None, state: str | None = None) -> View:
     View
         View whose method ``panel`` returns the Panel object.
     """
-    kind, loaded = _find_kind(source)
-    module, name = _VIEW_CLASSES[kind]
-    view_class: type[View] = getattr(importlib.import_module(module), name)
-    return view_class.restore(loaded, view_class.parse_state(state))
+    kind, loaded = _find_view_kind_and_object(source)
+    module, name = _MODULE_AND_CLASS_BY_VIEW_KIND[kind]
+    view_class: type[ExplorerView] = getattr(importlib.import_module(module), name)
+    return view_class.create_with_widget_state(loaded, view_class.parse_widget_state(state))
 
 
-def _find_kind(source: Any) -> tuple[str, Any]:
+def _find_view_kind_and_object(source: Any) -> tuple[str, Any]:
     """Return the type of view to create and the object to display.
 
     If the source is a results file, the function opens the file. If the source is the file of a
@@ -68,6 +68,6 @@ def _find_kind(source: Any) -> tuple[str, Any]:
         rule = "is not a scene, a rig, a record, a dataset or the path of a file"
         remedy = "Pass a Scene, a Rig, a Record, a dataset of rsfstudy, or the path of a file."
         raise InvalidValue("source", source, rule, remedy=remedy)
-    if Path(source).suffix.lower() in _RESULTS_SUFFIXES:
-        return _find_kind(read_dataset(Path(source)))
+    if Path(source).suffix.lower() in _RESULTS_FILE_SUFFIXES:
+        return _find_view_kind_and_object(read_dataset(Path(source)))
     return "record", Path(source)

@@ -11,7 +11,7 @@ from scipy.linalg import cholesky_banded, solve_banded
 _UNAVERAGED_NOISE_VARIANCE_FRACTION, MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
 
 
-class AveragedNoiseCorrelation:
+class NoiseCorrelationFromAveraging:
     r"""Noise correlation matrix of rows with overlapping averaging times.
 
     Parameters
@@ -67,13 +67,16 @@ class AveragedNoiseCorrelation:
         )
 
     @property
-    def log_determinant(self) -> float:
+    def correlation_log_determinant(self) -> float:
         """Logarithm of the determinant of the correlation matrix."""
         return float(2.0 * np.sum(np.log(self.cholesky_factor[0])))
 
 
 def apply_running_mean(
-    time: np.ndarray, sample_columns: np.ndarray, averaging_time: float, centre: float = 0.0
+    time: np.ndarray,
+    sample_columns: np.ndarray,
+    averaging_time: float,
+    window_centre_offset: float = 0.0,
 ) -> np.ndarray:
     """Compute the running mean of each column of an array.
 
@@ -102,6 +105,9 @@ def apply_running_mean(
     sums = np.concatenate([np.zeros((1, sample_columns.shape[1])), np.cumsum(pieces, axis=0)])
     ends = [
         np.column_stack([np.interp(time + side, at, column) for column in sums.T])
-        for side in (centre + 0.5 * averaging_time, centre - 0.5 * averaging_time)
+        for side in (
+            window_centre_offset + 0.5 * averaging_time,
+            window_centre_offset - 0.5 * averaging_time,
+        )
     ]
     return np.asarray((ends[0] - ends[1]) / averaging_time)

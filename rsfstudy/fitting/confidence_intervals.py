@@ -22,7 +22,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
-from rsfstudy.fitting.window_model import coordinate_to_parameter
+from rsfstudy.fitting.window_model import fit_coordinate_to_parameter
 
 #: Settings of confidence intervals. The first value is the confidence level. The profile likelihood
 #: is computed if the relative deviation of the log-likelihood from a quadratic function exceeds the
@@ -45,7 +45,7 @@ from rsfstudy.fitting.window_model import coordinate_to_parameter
 )
 
 
-def student_t_multiplier(solution: FitSolution, confidence_level: float) -> float:
+def compute_student_t_quantile(fit_solution: FitSolution, confidence_level: float) -> float:
     """Compute the half-width of a confidence interval in units of standard error.
 
     Parameters
@@ -60,11 +60,11 @@ def student_t_multiplier(solution: FitSolution, confidence_level: float) -> floa
     float
         Quantile of Student's t distribution with the degrees of freedom of the fit.
     """
-    return float(student.isf(0.5 * (1.0 - confidence_level), solution.degrees_of_freedom))
+    return float(student.isf(0.5 * (1.0 - confidence_level), fit_solution.degrees_of_freedom))
 
 
-def confidence_interval(
-    problem: FitProblem, solution: FitSolution, parameter_name: str
+def compute_confidence_interval(
+    fit_problem: FitProblem, fit_solution: FitSolution, parameter_name: str
 ) -> tuple[float, float]:
     """Compute the 95 % confidence interval of a parameter.
 
@@ -89,18 +89,24 @@ def confidence_interval(
         Upper end of the interval, in the unit of the parameter.
     """
     profile, far = (
-        LikelihoodProfile(problem, solution, parameter_name),
-        student_t_multiplier(solution, CONFIDENCE_LEVEL),
+        LikelihoodProfile(fit_problem, fit_solution, parameter_name),
+        compute_student_t_quantile(fit_solution, CONFIDENCE_LEVEL),
     )
     best = float(profile.best_coordinates[profile.parameter_index])
-    wider = float(solution.coordinate_stderr[profile.parameter_index]) / profile.stderr_from_noise
-    ends = [best + wider * (profile.find_interval_end(sign, far) - best) for sign in (-1.0, 1.0)]
+    wider = (
+        float(fit_solution.fit_coordinate_stderr[profile.parameter_index])
+        / profile.stderr_from_noise
+    )
+    ends = [
+        best + wider * (profile.find_confidence_interval_end(sign, far) - best)
+        for sign in (-1.0, 1.0)
+    ]
     bounds = (
-        problem.lower_bounds[profile.parameter_index],
-        problem.upper_bounds[profile.parameter_index],
+        fit_problem.lower_bounds[profile.parameter_index],
+        fit_problem.upper_bounds[profile.parameter_index],
     )
     low, high = (
-        coordinate_to_parameter(parameter_name, float(end)) for end in np.clip(ends, *bounds)
+        fit_coordinate_to_parameter(parameter_name, float(end)) for end in np.clip(ends, *bounds)
     )
     return low, high
 
@@ -136,16 +142,22 @@ class LikelihoodProfile:
             solution,
             solution.free_parameters.index(parameter_name),
         )
-        self.best_coordinates = problem.values_to_coordinates(solution.parameter_values)
+        self.best_coordinates = problem.parameter_values_to_fit_coordinates(
+            solution.parameter_values
+        )
         variance = float(
-            solution.noise_caused_covariance[self.parameter_index, self.parameter_index]
+            solution.fit_coordinate_covariance_from_noise[
+                self.parameter_index, self.parameter_index
+            ]
         )
         self.stderr_from_noise = math.sqrt(variance)
         self.coordinate_change_ratios = (
-            solution.noise_caused_covariance[:, self.parameter_index] / variance
+            solution.fit_coordinate_covariance_from_noise[:, self.parameter_index] / variance
         )
 
-    def find_interval_end(self, direction_sign: float, stderr_count: float) -> float:
+    def find_confidence_interval_end(
+        self, direction_sign: float, distance_in_stderrs: float
+    ) -> float:
         """Find an end of a confidence interval.
 
         Parameters
@@ -165,23 +177,23 @@ class LikelihoodProfile:
             self.parameter_index
         ]
         most = abs(float(bound - self.best_coordinates[self.parameter_index]))
-        at, power, before = min(stderr_count * self.stderr_from_noise, most), 2.0, (0.0, 0.0)
+        at, power, before = min(distance_in_stderrs * self.stderr_from_noise, most), 2.0, (0.0, 0.0)
         for number in range(_MAX_INTERVAL_END_ITERATIONS):
             squared = self.compute_twice_log_likelihood_decrease(
                 float(self.best_coordinates[self.parameter_index] + direction_sign * at)
             )
-            if (at == most and squared < stderr_count**2) or abs(
-                squared / stderr_count**2 - 1.0
+            if (at == most and squared < distance_in_stderrs**2) or abs(
+                squared / distance_in_stderrs**2 - 1.0
             ) < _INTERVAL_END_TOLERANCE:
                 break
             here = math.log(at), math.log(min(max(squared, 1e-9), 1e9))
             if number:  # The log-likelihood may be flatter or steeper than a parabola.
                 power = min(max((here[1] - before[1]) / (here[0] - before[0]), 0.3), 6.0)
-            factor = math.exp((2.0 * math.log(stderr_count) - here[1]) / power)
+            factor = math.exp((2.0 * math.log(distance_in_stderrs) - here[1]) / power)
             at, before = min(most, at * min(max(factor, 0.3), 3.0)), here
         return float(self.best_coordinates[self.parameter_index] + direction_sign * at)
 
-    def compute_twice_log_likelihood_decrease(self, coordinate: float) -> float:
+    def compute_twice_log_likelihood_decrease(self, fit_coordinate: float) -> float:
         """Compute the squared distance of a parameter from its best value.
 
         The squared distance between a value of the parameter and the best value is twice the
@@ -200,7 +212,7 @@ class LikelihoodProfile:
         float
             Squared distance from the best value, or infinity if the simulation of the motion fails.
         """
-        moved = coordinate - self.best_coordinates[self.parameter_index]
+        moved = fit_coordinate - self.best_coordinates[self.parameter_index]
         parabola = float(moved / self.stderr_from_noise) ** 2
         # Without constraints on all parameters, the search would not converge.
         if not parabola or self.solution.unidentified_parameters:
@@ -210,7 +222,7 @@ class LikelihoodProfile:
             self.problem.lower_bounds,
             self.problem.upper_bounds,
         )
-        x[self.parameter_index] = coordinate
+        x[self.parameter_index] = fit_coordinate
         nearly = self._compute_linearised_excess_sum_of_squares(x)
         if (
             not math.isfinite(nearly)
@@ -220,7 +232,7 @@ class LikelihoodProfile:
         others = np.arange(len(x)) != self.parameter_index
         rest = FitProblem(
             self.problem.model,
-            self.problem.coordinates_to_values(x),
+            self.problem.fit_coordinates_to_parameter_values(x),
             [
                 name
                 for name in self.solution.free_parameters
@@ -235,37 +247,37 @@ class LikelihoodProfile:
         x[others], _ = rest.minimise_weighted_squares(
             x[others], self.solution.noise_model, _MINIMUM_SQUARES_TOLERANCE / len(others)
         )
-        left = self._whitened_residuals(x)
+        left = self._compute_whitened_residuals(x)
         self.coordinate_change_ratios = (x - self.best_coordinates) / moved
-        return self._compute_excess_sum_of_squares(left)
+        return self._compute_sum_of_squares_above_minimum(left)
 
-    def _whitened_residuals(self, coordinates: np.ndarray) -> np.ndarray:
+    def _compute_whitened_residuals(self, fit_coordinates: np.ndarray) -> np.ndarray:
         """Compute whitened residuals divided by the noise standard deviation.
 
         If the simulation of the motion fails, the residuals are NaN.
         """
-        left = self.problem.residuals(
-            self.problem.coordinates_to_values(coordinates), require_stable=True
+        left = self.problem.compute_residuals(
+            self.problem.fit_coordinates_to_parameter_values(fit_coordinates), require_stable=True
         )
         return (
             self.solution.noise_model.whiten_columns(left[:, None])[:, 0] / self.solution.noise_sd
         )
 
-    def _compute_excess_sum_of_squares(self, residuals: np.ndarray) -> float:
+    def _compute_sum_of_squares_above_minimum(self, residuals: np.ndarray) -> float:
         """Return the difference between a sum of squares and its minimum."""
         return float(residuals @ residuals - np.square(self.solution.whitened_residuals).sum())
 
-    def _compute_linearised_excess_sum_of_squares(self, coordinates: np.ndarray) -> float:
+    def _compute_linearised_excess_sum_of_squares(self, fit_coordinates: np.ndarray) -> float:
         """Compute the increase in the sum of squares with a linearised model.
 
         The result is the difference between the sum of squares and its minimum. The sum of squares
         is minimised with respect to all parameters except the parameter of the profile likelihood.
         """
-        left = self._whitened_residuals(coordinates)
+        left = self._compute_whitened_residuals(fit_coordinates)
         if not np.isfinite(left).all():
             return math.inf
         others = np.delete(self.solution.jacobian, self.parameter_index, axis=1)
         columns = self.solution.noise_model.whiten_columns(others) / self.solution.noise_sd
-        return self._compute_excess_sum_of_squares(
+        return self._compute_sum_of_squares_above_minimum(
             left - columns @ np.linalg.lstsq(columns, left)[0]
         )

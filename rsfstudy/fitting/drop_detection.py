@@ -38,25 +38,25 @@ DETECTION_MARGIN_IN_STANDARD_DEVIATIONS = 3.1
 #: sample is equal to this number of standard deviations.
 _DROP_EXTENT_THRESHOLD_SIGMAS = 2.0
 #: The noise is estimated from the shortest interval that contains this fraction of the values.
-_FRACTION_OF_VALUES_IN_MODE = 0.4
+_FRACTION_OF_VALUES_IN_SHORTEST_INTERVAL = 0.4
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
 #: A record is resampled if the ratio of its longest to its shortest sampling interval exceeds this
 #: value.
-_MAX_SAMPLING_INTERVAL_RATIO = 3.0
+_MAX_INTERVAL_RATIO_OF_EVEN_SAMPLING = 3.0
 #: An averaging window is too short for a stress drop if the detection score of a longer window
 #: exceeds the detection score of this window by more than this factor. The longer windows are twice
 #: and four times as long.
-_MIN_SCORE_RATIO_OF_LONGER_WINDOW = 1.4
+_MIN_SCORE_RATIO_TO_PREFER_LONGER_WINDOW = 1.4
 #: Index of the shortest averaging window from which the noise correlation is estimated. This window
 #: is 16 samples long.
-_SHORTEST_CORRELATION_WINDOW_INDEX = 2
+_SHORTEST_NOISE_CORRELATION_WINDOW_INDEX = 2
 #: Smallest prominence of a peak that counts as a separate stress drop, relative to the height of
 #: the peak.
-_MIN_RELATIVE_PROMINENCE = 0.5
+_MIN_PROMINENCE_OVER_PEAK_HEIGHT = 0.5
 
 
-class DropCandidate(NamedTuple):
+class StressDropCandidate(NamedTuple):
     """Detected stress drop.
 
     Parameters
@@ -74,9 +74,9 @@ class DropCandidate(NamedTuple):
 
     start_time: float
     end_time: float
-    window_duration: float
-    mean_difference_stderr: float
-    noise_correlation_factor: float
+    averaging_window_duration: float
+    window_mean_difference_stderr: float
+    stderr_factor_of_correlated_noise: float
 
 
 class Detection(NamedTuple):
@@ -107,13 +107,13 @@ class Detection(NamedTuple):
     0.01
     """
 
-    candidates: list[DropCandidate]
+    candidates: list[StressDropCandidate]
     noise_sd: float
     detectable_drop: float
     max_decrease: float
 
 
-def robust_sd(values: np.ndarray) -> float:
+def estimate_robust_sd(samples: np.ndarray) -> float:
     """Estimate the standard deviation from the median absolute deviation.
 
     Parameters
@@ -126,10 +126,10 @@ def robust_sd(values: np.ndarray) -> float:
     float
         Estimated standard deviation.
     """
-    return _STANDARD_DEVIATION_PER_MAD * float(np.median(np.abs(values - np.median(values))))
+    return _STANDARD_DEVIATION_PER_MAD * float(np.median(np.abs(samples - np.median(samples))))
 
 
-def find_smallest_value_step(values: np.ndarray) -> float:
+def find_smallest_nonzero_difference(samples: np.ndarray) -> float:
     """Return the smallest nonzero difference between successive samples.
 
     Parameters
@@ -142,11 +142,11 @@ def find_smallest_value_step(values: np.ndarray) -> float:
     float
         Smallest difference, or infinity if all samples are equal.
     """
-    steps = np.abs(np.diff(values))
+    steps = np.abs(np.diff(samples))
     return float(steps[steps > 0.0].min(initial=math.inf))
 
 
-def estimate_mean_and_sd_of_mode(values: np.ndarray) -> tuple[float, float]:
+def fit_gaussian_to_most_frequent_values(values: np.ndarray) -> tuple[float, float]:
     """Estimate the mean and standard deviation of the most frequent values.
 
     The function finds the shortest interval that contains 40 % of the values. The results are the
@@ -166,16 +166,16 @@ def estimate_mean_and_sd_of_mode(values: np.ndarray) -> tuple[float, float]:
         Standard deviation of the Gaussian distribution.
     """
     ordered = np.sort(values)
-    count = max(int(_FRACTION_OF_VALUES_IN_MODE * len(ordered)), 1)
+    count = max(int(_FRACTION_OF_VALUES_IN_SHORTEST_INTERVAL * len(ordered)), 1)
     widths = ordered[count:] - ordered[:-count]
     first = int(np.argmin(widths))
     middle = 0.5 * float(ordered[first] + ordered[first + count])
     return middle, float(widths[first]) / (
-        2.0 * float(norm.ppf(0.5 + 0.5 * _FRACTION_OF_VALUES_IN_MODE))
+        2.0 * float(norm.ppf(0.5 + 0.5 * _FRACTION_OF_VALUES_IN_SHORTEST_INTERVAL))
     )
 
 
-def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray:
+def compute_window_mean_decreases(samples: np.ndarray, window_sample_count: int) -> np.ndarray:
     """Compute the difference between window means before and after each sample.
 
     Parameters
@@ -191,16 +191,16 @@ def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray
         For each sample, the mean of the window that ends before the sample, minus the mean of the
         window that begins at the sample.
     """
-    sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
+    sums = np.concatenate([[0.0], np.cumsum(samples - samples.mean())])
     fallen = (
-        2.0 * sums[window_samples:-window_samples]
-        - sums[: -2 * window_samples]
-        - sums[2 * window_samples :]
+        2.0 * sums[window_sample_count:-window_sample_count]
+        - sums[: -2 * window_sample_count]
+        - sums[2 * window_sample_count :]
     )
-    return np.asarray(fallen / window_samples)
+    return np.asarray(fallen / window_sample_count)
 
 
-def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
+def detect_stress_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
     """Detect stress drops in a record.
 
     Parameters
@@ -218,12 +218,14 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
     windows = [MIN_WINDOW_SAMPLES]
     while 2 * windows[-1] * MIN_RECORD_OVER_WINDOW_LENGTH <= len(s):
         windows.append(2 * windows[-1])
-    quantum = min(find_smallest_value_step(stress), float(np.ptp(stress)))
+    quantum = min(find_smallest_nonzero_difference(stress), float(np.ptp(stress)))
     looks = float(norm.isf(FALSE_DETECTION_PROBABILITY / (len(s) * len(windows))))
     scales = [_WindowMeanDifferences(s, window, looks, quantum) for window in windows]
-    found: list[DropCandidate] = []
+    found: list[StressDropCandidate] = []
     for number, scale in enumerate(scales):
-        for first, last in scale.find_drops_best_seen_in_window(scales[number + 1 : number + 3]):
+        for first, last in scale.find_drops_not_clearer_in_longer_windows(
+            scales[number + 1 : number + 3]
+        ):
             begins, ends = float(t[max(first - 1, 0)]), float(t[min(last, len(t) - 1)])
             length = scale.window_samples * apart
             reach = length if found else 0.0
@@ -231,10 +233,12 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
                 begins < one.end_time + reach and one.start_time - reach < ends for one in found
             ):
                 continue
-            wider = min(max(number + 1, _SHORTEST_CORRELATION_WINDOW_INDEX), len(scales) - 1)
-            correlation = scales[wider].noise_correlation_factor
+            wider = min(max(number + 1, _SHORTEST_NOISE_CORRELATION_WINDOW_INDEX), len(scales) - 1)
+            correlation = scales[wider].stderr_factor_of_correlated_noise
             found.append(
-                DropCandidate(begins, ends, length, scale.decrease_standard_deviation, correlation)
+                StressDropCandidate(
+                    begins, ends, length, scale.decrease_standard_deviation, correlation
+                )
             )
     best = min(scales, key=lambda scale: scale.detectable_drop)
     means = np.convolve(s, np.full(best.window_samples, 1.0 / best.window_samples), "valid")
@@ -250,7 +254,7 @@ def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, 
     samples.
     """
     gaps = np.diff(time)
-    if gaps.max() < _MAX_SAMPLING_INTERVAL_RATIO * gaps.min():
+    if gaps.max() < _MAX_INTERVAL_RATIO_OF_EVEN_SAMPLING * gaps.min():
         return time, stress
     ordered = np.sort(gaps)
     sums = np.cumsum(ordered)
@@ -291,9 +295,9 @@ class _WindowMeanDifferences:
         threshold_sigmas: float,
         rounding_quantum: float,
     ) -> None:
-        change = window_mean_decreases(stress, window_samples)
+        change = compute_window_mean_decreases(stress, window_samples)
         self.window_samples, self.sample_count = window_samples, len(stress)
-        self.typical_decrease, decrease_sd = estimate_mean_and_sd_of_mode(change)
+        self.typical_decrease, decrease_sd = fit_gaussian_to_most_frequent_values(change)
         # If there is no noise, the resolution of stress determines the spread.
         self.decrease_standard_deviation = max(
             decrease_sd, rounding_quantum / math.sqrt(6.0 * window_samples)
@@ -308,7 +312,9 @@ class _WindowMeanDifferences:
             + DETECTION_MARGIN_IN_STANDARD_DEVIATIONS * self.decrease_standard_deviation
         )
         self.excess_decrease = change - max(0.0, self.typical_decrease)
-        lag = estimate_mean_and_sd_of_mode(stress[window_samples:] - stress[:-window_samples])[1]
+        lag = fit_gaussian_to_most_frequent_values(
+            stress[window_samples:] - stress[:-window_samples]
+        )[1]
         self.noise_sd = max(lag / math.sqrt(2.0), rounding_quantum / math.sqrt(12.0))
         # The lower limit is correct for white noise, and the upper limit for noise that is constant
         # within a window.
@@ -317,7 +323,7 @@ class _WindowMeanDifferences:
             / (self.noise_sd or 1.0)
             / math.sqrt(2.0 / window_samples)
         )
-        self.noise_correlation_factor = min(max(ratio, 1.0), math.sqrt(window_samples))
+        self.stderr_factor_of_correlated_noise = min(max(ratio, 1.0), math.sqrt(window_samples))
 
     def compute_detection_scores(self, sample_indices: np.ndarray) -> np.ndarray:
         """Compute the detection scores of samples.
@@ -345,7 +351,7 @@ class _WindowMeanDifferences:
             net / (self.decrease_standard_deviation or 1.0) / math.sqrt(self.window_samples)
         )
 
-    def find_drops_best_seen_in_window(
+    def find_drops_not_clearer_in_longer_windows(
         self, longer_windows: list[_WindowMeanDifferences]
     ) -> list[tuple[int, int]]:
         """Find drops whose detection scores are not clearly higher in longer windows.
@@ -365,11 +371,11 @@ class _WindowMeanDifferences:
         # The values are padded because a peak may be at an end of the record.
         padded = np.concatenate([[0.0], self.excess_decrease, [0.0]])
         peaks, about = find_peaks(padded, height=self.detection_threshold, prominence=0.0)
-        peaks = peaks[about["prominences"] > _MIN_RELATIVE_PROMINENCE * padded[peaks]]
+        peaks = peaks[about["prominences"] > _MIN_PROMINENCE_OVER_PEAK_HEIGHT * padded[peaks]]
         places = peaks - 1 + self.window_samples
         better = [
             scale.compute_detection_scores(places)
-            > _MIN_SCORE_RATIO_OF_LONGER_WINDOW * self.compute_detection_scores(places)
+            > _MIN_SCORE_RATIO_TO_PREFER_LONGER_WINDOW * self.compute_detection_scores(places)
             for scale in longer_windows
         ]
         complete = ~np.any(better, axis=0) if better else np.ones(len(peaks), dtype=bool)

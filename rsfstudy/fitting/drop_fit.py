@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.fitting.drop_detection import DropCandidate
+from rsfstudy.fitting.drop_detection import StressDropCandidate
 
 #: Settings for the number of samples to fit on each side of a drop. The samples extend over the
 #: window length times the first value, or over the duration of the drop times the second value,
@@ -36,7 +36,7 @@ _SIDE_LENGTH_IN_WINDOWS, _SIDE_LENGTH_IN_DROP_DURATIONS, _MIN_SIDE_SAMPLES, _MAX
 _MAX_SAMPLES_IN_FIT = 300
 #: Longest time between a detected drop and the fitted start or end of the drop, in durations of the
 #: averaging window.
-_SEARCH_MARGIN_IN_WINDOWS = 2.0
+_DROP_TIME_SEARCH_MARGIN_IN_WINDOWS = 2.0
 #: Number of start times (and of end times) in each search grid, and number of refinements of the
 #: search grid.
 _SEARCH_GRID_SIZE, _SEARCH_GRID_REFINEMENTS = 16, 3
@@ -45,16 +45,16 @@ _MAX_SLOPE_BESIDE_DROP_OVER_DROP_SLOPE = 0.3
 #: Limit for the stress decrease on one side of a drop, relative to the size of the drop. The limit
 #: applies to the difference between this stress decrease and the decrease expected from the slope
 #: on the other side of the drop.
-_MAX_EXCESS_FALL_BESIDE_DROP_OVER_DROP = 0.5
+_MAX_STRESS_FALL_OUTSIDE_OVER_DROP_SIZE = 0.5
 #: Difference between the sum of squares at the ends of a 95 % confidence interval and the minimum
 #: sum of squares, in noise variances. The first value applies to the confidence interval of the
 #: time of a sudden change, and is equal to -2 ln 0.0253. The second value applies to the confidence
 #: intervals of all other parameters.
 _TIME_INTERVAL_EXCESS_SQUARES, _SIZE_INTERVAL_EXCESS_SQUARES = 7.4, 3.84
 #: Half width of a 95 % confidence interval in standard errors.
-STDERRS_PER_95_PERCENT_HALF_WIDTH = 1.96
+HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS = 1.96
 #: Error of a time that lies between two samples, relative to the sampling interval.
-_TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
+_START_TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
 #: Smallest number of samples that are required for estimating the stress before a drop, or the
 #: stress after a drop.
 _MIN_SAMPLES_BESIDE_DROP = 3
@@ -89,11 +89,11 @@ class FittedStressDrop(NamedTuple):
     end_time: float
     stress_before: float
     stress_after: float
-    start_error: float
-    end_error: float
+    start_time_error: float
+    end_time_error: float
     stress_before_error: float
     stress_after_error: float
-    drop_error: float
+    stress_drop_error: float
     residual_sd: float
     starts_before_record: bool
     ends_after_record: bool
@@ -115,12 +115,12 @@ class _ThreeLineFits(NamedTuple):
     """
 
     corner_time_pairs: np.ndarray
-    coefficients: np.ndarray
+    line_coefficients: np.ndarray
     inverse_normal_matrix: np.ndarray
     residual_sums_of_squares: np.ndarray
 
     @property
-    def best_pair_index(self) -> int:
+    def best_corner_time_pair_index(self) -> int:
         """Index of the pair of start and end times with the smallest sum of squares.
 
         If several pairs have the same sum of squares within rounding errors, the result is the
@@ -133,11 +133,11 @@ class _ThreeLineFits(NamedTuple):
         )
 
 
-def fit_drop(
+def fit_stress_drop(
     time: np.ndarray,
     stress: np.ndarray,
-    candidate: DropCandidate,
-    neighbour_limits: tuple[float, float],
+    candidate: StressDropCandidate,
+    adjacent_drop_times: tuple[float, float],
     noise_sd: float,
 ) -> FittedStressDrop:
     """Fit three connected lines to the stress around a drop.
@@ -158,30 +158,34 @@ def fit_drop(
     FittedStressDrop
         Start, end and stresses of the drop, with their errors.
     """
-    rows = _select_rows_around_drop(time, candidate, neighbour_limits)
+    rows = _select_rows_around_drop(time, candidate, adjacent_drop_times)
     every = -(-len(rows) // _MAX_SAMPLES_IN_FIT)
     whole = rows[: len(rows) // every * every]
     t, y = (of[whole].reshape(-1, every).mean(axis=1) for of in (time, stress))
     origin, scale = float(t[0]), float(t[-1] - t[0])
     t = (t - origin) / scale
     begins, ends = ((at - origin) / scale for at in candidate[:2])
-    lines = _search_drop_times(t, y, begins, ends, candidate.window_duration / scale)
-    best = lines.best_pair_index
+    lines = _search_drop_start_and_end_times(
+        t, y, begins, ends, candidate.averaging_window_duration / scale
+    )
+    best = lines.best_corner_time_pair_index
     left = float(lines.residual_sums_of_squares[best]) / max(len(t) - 6, 1)
-    variance = max(left, 0.25 * noise_sd**2 / every) * candidate.noise_correlation_factor**2
+    variance = (
+        max(left, 0.25 * noise_sd**2 / every) * candidate.stderr_factor_of_correlated_noise**2
+    )
     excess = lines.residual_sums_of_squares - lines.residual_sums_of_squares[best]
     late = np.abs(
         lines.corner_time_pairs[excess <= _TIME_INTERVAL_EXCESS_SQUARES * variance]
         - lines.corner_time_pairs[best]
     ).max(axis=0)
-    sizes = lines.coefficients[:, 0] - lines.coefficients[:, 1]
+    sizes = lines.line_coefficients[:, 0] - lines.line_coefficients[:, 1]
     spread = float(
         np.abs(sizes[excess <= _SIZE_INTERVAL_EXCESS_SQUARES * variance] - sizes[best]).max()
     )
     inverse = lines.inverse_normal_matrix[best]
     variances = np.array([inverse[0, 0], inverse[1, 1], inverse[:2, :2].trace()])
     variances[2] -= 2.0 * inverse[0, 1]
-    of_before, of_after, of_drop = STDERRS_PER_95_PERCENT_HALF_WIDTH * np.sqrt(
+    of_before, of_after, of_drop = HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * np.sqrt(
         np.maximum(variance * variances, 0.0)
     )
     begins, t1 = t0, _ = lines.corner_time_pairs[best].tolist()
@@ -193,13 +197,13 @@ def fit_drop(
     return FittedStressDrop(
         start_time=origin + scale * begins,
         end_time=origin + scale * t1,
-        stress_before=float(lines.coefficients[best, 0]),
-        stress_after=float(lines.coefficients[best, 1]),
-        start_error=scale * (float(late[0]) + _TIME_ERROR_OVER_SAMPLING_INTERVAL * gap0),
-        end_error=scale * (float(late[1]) + gap1),
+        stress_before=float(lines.line_coefficients[best, 0]),
+        stress_after=float(lines.line_coefficients[best, 1]),
+        start_time_error=scale * (float(late[0]) + _START_TIME_ERROR_OVER_SAMPLING_INTERVAL * gap0),
+        end_time_error=scale * (float(late[1]) + gap1),
         stress_before_error=float(of_before + spread),
         stress_after_error=float(of_after + spread),
-        drop_error=float(of_drop + spread),
+        stress_drop_error=float(of_drop + spread),
         residual_sd=float(np.sqrt(left * every)),
         starts_before_record=bool(rows[0] == 0 and (t <= t0).sum() < _MIN_SAMPLES_BESIDE_DROP),
         ends_after_record=bool(
@@ -209,7 +213,7 @@ def fit_drop(
 
 
 def _select_rows_around_drop(
-    time: np.ndarray, candidate: DropCandidate, neighbour_limits: tuple[float, float]
+    time: np.ndarray, candidate: StressDropCandidate, adjacent_drop_times: tuple[float, float]
 ) -> np.ndarray:
     """Return the indices of the samples around a drop.
 
@@ -222,23 +226,23 @@ def _select_rows_around_drop(
     start = min(int(np.searchsorted(time, begins - reach)), first - _MIN_SIDE_SAMPLES)
     stop = max(int(np.searchsorted(time, ends + reach)), last + _MIN_SIDE_SAMPLES)
     start = max(
-        start, first - _MAX_SIDE_SAMPLES, int(np.searchsorted(time, neighbour_limits[0])), 0
+        start, first - _MAX_SIDE_SAMPLES, int(np.searchsorted(time, adjacent_drop_times[0])), 0
     )
     stop = min(
         stop,
         last + _MAX_SIDE_SAMPLES,
-        int(np.searchsorted(time, neighbour_limits[1], "right")),
+        int(np.searchsorted(time, adjacent_drop_times[1], "right")),
         len(time),
     )
     start, stop = min(start, max(first - 2, 0)), max(stop, min(last + 2, len(time)))
     return np.arange(start, stop)
 
 
-def _search_drop_times(
+def _search_drop_start_and_end_times(
     time: np.ndarray,
     stress: np.ndarray,
-    start_candidates: float,
-    end_candidates: float,
+    start_time_guess: float,
+    end_time_guess: float,
     window_duration: float,
 ) -> _ThreeLineFits:
     """Search for the times at which the drop begins and ends.
@@ -246,10 +250,12 @@ def _search_drop_times(
     The search evaluates pairs of times on a grid, and refines the grid several times around the
     best pair.
     """
-    reach = max(_SEARCH_MARGIN_IN_WINDOWS * window_duration, end_candidates - start_candidates)
+    reach = max(
+        _DROP_TIME_SEARCH_MARGIN_IN_WINDOWS * window_duration, end_time_guess - start_time_guess
+    )
     halves = np.sort(np.concatenate([time, 0.5 * (time[1:] + time[:-1])]))
-    starts = halves[(halves >= start_candidates - reach) & (halves < end_candidates)]
-    stops = halves[(halves > start_candidates) & (halves <= end_candidates + reach)]
+    starts = halves[(halves >= start_time_guess - reach) & (halves < end_time_guess)]
+    stops = halves[(halves > start_time_guess) & (halves <= end_time_guess + reach)]
     parts: list[_ThreeLineFits] = []
     for level in range(_SEARCH_GRID_REFINEMENTS + 1):
         pairs = np.array(
@@ -261,12 +267,12 @@ def _search_drop_times(
             ]
         )
         if len(pairs):
-            parts.append(_fit_three_lines(time, stress, pairs))
+            parts.append(_fit_three_connected_lines(time, stress, pairs))
         found = parts[int(np.argmin([part.residual_sums_of_squares.min() for part in parts]))]
-        best = found.corner_time_pairs[found.best_pair_index]
+        best = found.corner_time_pairs[found.best_corner_time_pair_index]
         near = [
             _select_times_near_centre(
-                halves, at, end_candidates - start_candidates + 2.0 * reach, level
+                halves, at, end_time_guess - start_time_guess + 2.0 * reach, level
             )
             for at in best
         ]
@@ -298,7 +304,7 @@ def _select_times_near_centre(
     )
 
 
-def _fit_three_lines(
+def _fit_three_connected_lines(
     time: np.ndarray, stress: np.ndarray, corner_time_pairs: np.ndarray
 ) -> _ThreeLineFits:
     """Fit three connected lines for each pair of start and end times of a drop.
@@ -333,7 +339,7 @@ def _fit_three_lines(
         (3, 2, time[-1] - corner_time_pairs[:, 1]),
     ):
         fall = np.minimum(values[:, other], 0.0) - values[:, own]
-        goes_on |= fall * np.maximum(beside, 0.0) > _MAX_EXCESS_FALL_BESIDE_DROP_OVER_DROP * drop
+        goes_on |= fall * np.maximum(beside, 0.0) > _MAX_STRESS_FALL_OUTSIDE_OVER_DROP_SIZE * drop
     values[:, :2] += centre
     squares[goes_on] += 1e3 * (float(np.square(stress - centre).sum()) + 1e-300)
     return _ThreeLineFits(corner_time_pairs, values, inverse, squares)

@@ -17,12 +17,16 @@ from rsfstudy.fitting.drop_detection import (
     DETECTION_MARGIN_IN_STANDARD_DEVIATIONS,
     FALSE_DETECTION_PROBABILITY,
     Detection,
-    find_smallest_value_step,
-    robust_sd,
-    window_mean_decreases,
+    compute_window_mean_decreases,
+    estimate_robust_sd,
+    find_smallest_nonzero_difference,
 )
-from rsfstudy.fitting.drop_fit import STDERRS_PER_95_PERCENT_HALF_WIDTH
-from rsfstudy.fitting.stress_drop_fits import EventNumbers, FittedDropCandidate, find_drops
+from rsfstudy.fitting.drop_fit import HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS
+from rsfstudy.fitting.stress_drop_fits import (
+    DetectedAndFittedStressDrop,
+    EventNumbers,
+    find_stress_drops,
+)
 
 #: Smallest difference between the displacement during the drops and the displacement in equally
 #: long intervals before and after the drops. The first value is in standard deviations of the
@@ -45,7 +49,7 @@ class DropSampleIndices(NamedTuple):
 
     start_index: int
     end_index: int
-    window_sample_count: int
+    averaging_sample_count: int
 
 
 class DropMeasurements(NamedTuple):
@@ -98,22 +102,22 @@ def read_drops(
     >>> [round(values["static_stress_drop"][0], 1) for values, _ in readings.event_rows]
     [1.0, 1.0, 1.0]
     """
-    found, detection = find_drops(times, stress)
-    ends = [-math.inf, *(of.drop.end_time for of in found)]
-    begins = [*(of.drop.start_time for of in found[1:]), math.inf]
+    found, detection = find_stress_drops(times, stress)
+    ends = [-math.inf, *(of.fitted_drop.end_time for of in found)]
+    begins = [*(of.fitted_drop.start_time for of in found[1:]), math.inf]
     rooms = [*zip(ends, begins, strict=False)][: len(found)]
     places = [find_sample_indices_of_drop(times, *of) for of in zip(found, rooms, strict=True)]
     each = zip(found, places, rooms, strict=True)
-    rows = [measure_drop(times, stress, displacement, *of) for of in each]
+    rows = [compute_drop_quantities(times, stress, displacement, *of) for of in each]
     is_slip = (
         displacement is None
         or not check_slip
-        or displacement_follows_drops(times, displacement, places)
+        or is_displacement_faster_during_drops(times, displacement, places)
     )
     return DropMeasurements(rows, detection, is_slip)
 
 
-def displacement_follows_drops(
+def is_displacement_faster_during_drops(
     times: np.ndarray, displacement: np.ndarray, drop_sample_indices: Sequence[DropSampleIndices]
 ) -> bool:
     """Return True if the displacement accelerates during stress drops.
@@ -135,10 +139,10 @@ def displacement_follows_drops(
         drops.
     """
     excess = usual = variance = 0.0
-    quantum = find_smallest_value_step(displacement)
+    quantum = find_smallest_nonzero_difference(displacement)
     noises = {
-        n: max(robust_sd(window_mean_decreases(displacement, n)), quantum)
-        for n in {place.window_sample_count for place in drop_sample_indices}
+        n: max(estimate_robust_sd(compute_window_mean_decreases(displacement, n)), quantum)
+        for n in {place.averaging_sample_count for place in drop_sample_indices}
     }
     for begin, end, window in drop_sample_indices:
         far = end + window - begin
@@ -159,7 +163,9 @@ def displacement_follows_drops(
 
 
 def find_sample_indices_of_drop(
-    times: np.ndarray, fitted_candidate: FittedDropCandidate, neighbour_limits: tuple[float, float]
+    times: np.ndarray,
+    detected_and_fitted_drop: DetectedAndFittedStressDrop,
+    adjacent_drop_times: tuple[float, float],
 ) -> DropSampleIndices:
     """Find the samples that belong to a stress drop.
 
@@ -180,23 +186,23 @@ def find_sample_indices_of_drop(
     DropSampleIndices
         Indices of the samples in the drop, and number of samples to average.
     """
-    drop, candidate = fitted_candidate
+    drop, candidate = detected_and_fitted_drop
     begin = int(np.searchsorted(times, drop.start_time, "right"))
     end = max(int(np.searchsorted(times, drop.end_time, "left")), begin)
-    before = int(np.searchsorted(times, drop.start_time - candidate.window_duration))
-    first, last = (int(np.searchsorted(times, at)) for at in neighbour_limits)
+    before = int(np.searchsorted(times, drop.start_time - candidate.averaging_window_duration))
+    first, last = (int(np.searchsorted(times, at)) for at in adjacent_drop_times)
     window = min(begin - before, begin - first, last - end, len(times) - end)
     window = max(min(window, len(times) // 4), 1)
     return DropSampleIndices(max(begin, window), min(end, len(times) - window), window)
 
 
-def measure_drop(
+def compute_drop_quantities(
     times: np.ndarray,
     stress: np.ndarray,
     displacement: np.ndarray | None,
-    fitted_candidate: FittedDropCandidate,
+    detected_and_fitted_drop: DetectedAndFittedStressDrop,
     sample_indices: DropSampleIndices,
-    neighbour_limits: tuple[float, float],
+    adjacent_drop_times: tuple[float, float],
 ) -> EventNumbers:
     """Compute the properties of a drop and their errors.
 
@@ -222,21 +228,26 @@ def measure_drop(
         0 if the record contains the stress before and after the drop. The value is 1 if the record
         begins during the drop, 2 if the record ends during the drop, and 3 if both are true.
     """
-    drop = fitted_candidate.drop
+    drop = detected_and_fitted_drop.fitted_drop
     row = {
-        "time": (drop.start_time, drop.start_error),
+        "time": (drop.start_time, drop.start_time_error),
         "duration": (
-            max(drop.end_time - drop.start_time, 0.0) or drop.end_error,
-            math.hypot(drop.start_error, drop.end_error),
+            max(drop.end_time - drop.start_time, 0.0) or drop.end_time_error,
+            math.hypot(drop.start_time_error, drop.end_time_error),
         ),
         "stress_before": (drop.stress_before, drop.stress_before_error),
         "stress_after": (drop.stress_after, drop.stress_after_error),
-        "static_stress_drop": (drop.stress_before - drop.stress_after, drop.drop_error),
+        "static_stress_drop": (drop.stress_before - drop.stress_after, drop.stress_drop_error),
     }
     cut = int(drop.starts_before_record) + 2 * int(drop.ends_after_record)
     if displacement is not None:
         row |= _measure_slip_of_drop(
-            times, stress, displacement, fitted_candidate, sample_indices, neighbour_limits
+            times,
+            stress,
+            displacement,
+            detected_and_fitted_drop,
+            sample_indices,
+            adjacent_drop_times,
         )
     return row, cut
 
@@ -245,9 +256,9 @@ def _measure_slip_of_drop(
     times: np.ndarray,
     stress: np.ndarray,
     displacement: np.ndarray,
-    fitted_candidate: FittedDropCandidate,
+    detected_and_fitted_drop: DetectedAndFittedStressDrop,
     sample_indices: DropSampleIndices,
-    neighbour_limits: tuple[float, float],
+    adjacent_drop_times: tuple[float, float],
 ) -> dict[str, tuple[float, float]]:
     """Compute the slip, peak slip rate and dynamic stress drop of a drop.
 
@@ -257,36 +268,39 @@ def _measure_slip_of_drop(
         Pairs of a value and its error. The peak slip rate and the dynamic stress drop are NaN if
         the slip rate does not exceed its noise.
     """
-    (drop, candidate), (begin, end, window) = fitted_candidate, sample_indices
+    (drop, candidate), (begin, end, window) = detected_and_fitted_drop, sample_indices
     size = drop.stress_before - drop.stress_after
-    first, last = (int(np.searchsorted(times, at)) for at in neighbour_limits)
+    first, last = (int(np.searchsorted(times, at)) for at in adjacent_drop_times)
     # If the window is shifted by m samples, the difference of means decreases by m drop/window.
     # The standard deviation of this change is sqrt(3 m/window) times the standard error. The
     # probability that noise shifts the drop further than this limit is 0.001.
     off = math.ceil(
         3.0
         * window
-        * (DETECTION_MARGIN_IN_STANDARD_DEVIATIONS * candidate.mean_difference_stderr / size) ** 2
+        * (DETECTION_MARGIN_IN_STANDARD_DEVIATIONS * candidate.window_mean_difference_stderr / size)
+        ** 2
     )
     off = max(0, min(off, window, begin - window - first, last - end - window))
     begin, end = begin - off, end + off
     slips, rates = (
-        -window_mean_decreases(displacement, window),
+        -compute_window_mean_decreases(displacement, window),
         np.diff(displacement) / np.diff(times),
     )
     fastest = begin - 1 + int(np.argmax(rates[begin - 1 : max(end, begin)]))
-    noise = robust_sd(rates)
+    noise = estimate_robust_sd(rates)
     slip = displacement[end : end + window].mean() - displacement[begin - window : begin].mean()
     crept = abs(float(np.median(slips))) * (1.0 + 2.0 * off / window)
-    row = {"slip": (slip, STDERRS_PER_95_PERCENT_HALF_WIDTH * robust_sd(slips) + crept)}
+    row = {
+        "slip": (slip, HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * estimate_robust_sd(slips) + crept)
+    }
     row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
     if rates[fastest] > noise * norm.isf(FALSE_DETECTION_PROBABILITY / len(rates)):
-        row["peak_slip_rate"] = rates[fastest], STDERRS_PER_95_PERCENT_HALF_WIDTH * noise
+        row["peak_slip_rate"] = rates[fastest], HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * noise
         # The stress at the peak slip rate is between the stresses of the two samples.
         ends = stress[fastest : fastest + 2]
-        reading = 0.5 * float(np.ptp(ends)) + STDERRS_PER_95_PERCENT_HALF_WIDTH * robust_sd(
-            np.diff(stress)
-        )
+        reading = 0.5 * float(
+            np.ptp(ends)
+        ) + HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * estimate_robust_sd(np.diff(stress))
         row["dynamic_stress_drop"] = (
             drop.stress_before - ends.mean(),
             drop.stress_before_error + reading,

@@ -25,7 +25,11 @@ from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 #: Lengths of the tested running means in rows, and criteria for detecting a filter. The first
 #: criterion is the smallest decrease in the AIC due to the filter. The second criterion is the
 #: smallest change of a parameter due to the filter, in standard errors.
-_TESTED_AVERAGE_LENGTHS_IN_ROWS, _MIN_AIC_GAIN_OF_RUNNING_MEAN, _MIN_PARAMETER_CHANGE_IN_STDERRS = (
+(
+    _TESTED_AVERAGE_LENGTHS_IN_ROWS,
+    _MIN_AIC_DECREASE_BY_RUNNING_MEAN,
+    _MIN_PARAMETER_CHANGE_IN_STDERRS,
+) = (
     range(2, 21),
     20.0,
     0.5,
@@ -33,16 +37,16 @@ _TESTED_AVERAGE_LENGTHS_IN_ROWS, _MIN_AIC_GAIN_OF_RUNNING_MEAN, _MIN_PARAMETER_C
 #: Smallest decrease in the AIC for which a low-pass filter is detected. This limit is larger than
 #: the limit for running means, because an inaccurate step time or stiffness has a similar effect to
 #: a low-pass filter.
-_MIN_AIC_GAIN_OF_LOW_PASS = 60.0
+_MIN_AIC_DECREASE_BY_LOW_PASS_FILTER = 60.0
 #: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
-_TESTED_RELATIVE_CORNER_FREQUENCIES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
+_CORNER_FREQUENCIES_OVER_SAMPLING_RATE = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
 #: Largest number of rows for the filter test, and number of iterations. In each iteration, the
 #: noise and the parameters are estimated.
 _MAX_ROWS_FOR_FILTER_TEST, _NOISE_ESTIMATION_PASSES = 20_000, 2
 
 
 def detect_unspecified_filter(
-    fit_solution: FitSolution, time: np.ndarray, noise: str
+    fit_solution: FitSolution, time: np.ndarray, noise_model_name: str
 ) -> tuple[str, ...]:
     """Test whether friction was filtered before it was recorded.
 
@@ -74,7 +78,7 @@ def detect_unspecified_filter(
         else fit_solution.loading_error_sensitivity
     )
     columns = np.column_stack([fit_solution.jacobian, delays, fit_solution.model_friction])
-    free = len(fit_solution.coordinate_stderr)
+    free = len(fit_solution.fit_coordinate_stderr)
 
     shortest_interval = min(float(np.diff(time[rows]).min()) for rows in windows)
 
@@ -95,12 +99,14 @@ def detect_unspecified_filter(
         moved = np.zeros(jacobian.shape[1])
         for _ in range(_NOISE_ESTIMATION_PASSES):
             guessed = left - jacobian @ moved
-            there = noises.guess_noise_by_moments(noise, time, guessed, kept, least, averaging)[0]
+            there = noises.estimate_noise_model_by_moments(
+                noise_model_name, time, guessed, kept, least, averaging
+            )[0]
             whitened = there.whiten_columns(np.column_stack([jacobian, left]))
             moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
         innovations = whitened[:, -1] - whitened[:, :-1] @ moved
         criterion = compute_aic(innovations, there, len(moved), len(time))
-        return criterion, float(np.max(np.abs(moved[:free]) / fit_solution.coordinate_stderr))
+        return criterion, float(np.max(np.abs(moved[:free]) / fit_solution.fit_coordinate_stderr))
 
     if len(time) > _MAX_ROWS_FOR_FILTER_TEST or not np.isfinite(columns).all():
         return ()
@@ -112,7 +118,11 @@ def detect_unspecified_filter(
         for kind, size in _iterate_candidate_filters(fit_solution, interval)
     ]
     best, change, kind, size = min(tried)
-    least_gain = _MIN_AIC_GAIN_OF_RUNNING_MEAN if kind == "mean" else _MIN_AIC_GAIN_OF_LOW_PASS
+    least_gain = (
+        _MIN_AIC_DECREASE_BY_RUNNING_MEAN
+        if kind == "mean"
+        else _MIN_AIC_DECREASE_BY_LOW_PASS_FILTER
+    )
     if not (plain - best > least_gain and change > _MIN_PARAMETER_CHANGE_IN_STDERRS):
         return ()
     if kind == "mean":
@@ -133,18 +143,20 @@ def _iterate_candidate_filters(
         yield "mean", rows * sampling_interval
     if fit_solution.noise_model.autoregressive_order:
         for kind in LOW_PASS_ORDERS:
-            for corner in _TESTED_RELATIVE_CORNER_FREQUENCIES:
+            for corner in _CORNER_FREQUENCIES_OVER_SAMPLING_RATE:
                 yield kind, corner / sampling_interval
 
 
 def _apply_filter_to_columns(
-    filter_kind: str, filter_size: float, time: np.ndarray, columns: np.ndarray
+    filter_kind: str, filter_size: float, time: np.ndarray, sample_columns: np.ndarray
 ) -> np.ndarray:
     """Apply a filter to the columns of a window."""
     if not filter_kind:
-        return columns
+        return sample_columns
     if filter_kind == "mean":
-        return apply_running_mean(time, columns, filter_size)
+        return apply_running_mean(time, sample_columns, filter_size)
     one = Filter(filter_kind, filter_size)
     at = one.sample_times(time)
-    return np.column_stack([one.apply(time, np.interp(at, time, each)) for each in columns.T])
+    return np.column_stack(
+        [one.apply(time, np.interp(at, time, each)) for each in sample_columns.T]
+    )

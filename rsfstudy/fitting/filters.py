@@ -124,8 +124,8 @@ class Filter:
             Times in s, in increasing order.
         """
         if self.kind in LOW_PASS_ORDERS:
-            return self._low_pass_time_grid(time)
-        return np.unique(time[:, None] + self._running_mean_time_offsets(time))
+            return self._build_low_pass_time_grid(time)
+        return np.unique(time[:, None] + self._compute_running_mean_time_offsets(time))
 
     def apply(self, time: np.ndarray, samples: np.ndarray) -> np.ndarray:
         """Apply the filter to unfiltered friction.
@@ -144,7 +144,9 @@ class Filter:
         """
         at = self.sample_times(time)
         if self.kind not in LOW_PASS_ORDERS:
-            places = np.searchsorted(at, time[:, None] + self._running_mean_time_offsets(time))
+            places = np.searchsorted(
+                at, time[:, None] + self._compute_running_mean_time_offsets(time)
+            )
             return np.asarray(samples[places].mean(axis=1))
         rate = 1.0 / float(at[1] - at[0])
         sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=rate, output="sos")
@@ -173,7 +175,7 @@ class Filter:
         """
         if self.kind in LOW_PASS_ORDERS:
             return slice(0, len(time))
-        before, after = self._averaging_times()
+        before, after = self._split_averaging_time_at_row()
         first = int(np.searchsorted(time, time[0] + before))
         last = int(np.searchsorted(time, time[-1] - after, side="right"))
         if first >= last:
@@ -234,11 +236,11 @@ class Filter:
         begin = sosfilt_zi(sections) * samples[0]
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
-    def _averaging_times(self) -> tuple[float, float]:
+    def _split_averaging_time_at_row(self) -> tuple[float, float]:
         """Return the durations in s of the averaging interval before and after a row."""
         return (0.5 * self.size, 0.5 * self.size) if self.kind == MEAN else (self.size, 0.0)
 
-    def _running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:
+    def _compute_running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:
         """Return the time offsets of the points that a running mean averages.
 
         Each offset is given in s, relative to the time of the row. If the averaging time is at
@@ -253,7 +255,7 @@ class Filter:
         middle = 0.5 if self.kind == MEAN else 1.0
         return np.asarray(self.size * ((np.arange(count) + 0.5) / count - middle))
 
-    def _low_pass_time_grid(self, time: np.ndarray) -> np.ndarray:
+    def _build_low_pass_time_grid(self, time: np.ndarray) -> np.ndarray:
         """Return the evenly spaced times for evaluating a low-pass filter."""
         first = float(time[0]) - _FILTER_SETTLING_PERIODS / self.size
         finest = max(

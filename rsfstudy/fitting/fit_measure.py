@@ -17,34 +17,38 @@ import numpy as np
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import posterior
-from rsfstudy.fitting.confidence_intervals import confidence_interval
+from rsfstudy.fitting.confidence_intervals import compute_confidence_interval
 from rsfstudy.fitting.filter_detection import detect_unspecified_filter
 from rsfstudy.fitting.filters import Filter
 from rsfstudy.fitting.fit_outputs import build_fit_outputs
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 from rsfstudy.fitting.fit_validity_checks import (
-    MIN_STATISTICAL_NOISE_SD,
-    describe_asymmetric_intervals,
+    MIN_NOISE_SD_ABOVE_NUMERICAL_ERRORS,
+    describe_asymmetric_confidence_intervals,
     describe_load_point_noise,
     describe_outliers,
     describe_unidentified_parameters,
+    find_reasons_for_invalid_stderrs,
     find_unidentified_parameters,
-    find_validity_problems,
-    is_rounding_too_coarse,
+    is_friction_rounding_too_coarse,
 )
 from rsfstudy.fitting.fit_window import (
     LOADING_KINDS,
     FitWindow,
-    compute_stiffness_factors,
-    guess_parameters,
+    compute_stiffness_ratios_to_first_window,
+    guess_initial_parameter_values,
 )
 from rsfstudy.fitting.joint_model import (
     JointModel,
-    add_window_numbers,
+    add_window_numbers_to_parameter_names,
     is_per_window_parameter,
     strip_window_number,
 )
-from rsfstudy.fitting.noise import WHITE_NOISE_NAME, check_noise_name, ljung_box_p_value
+from rsfstudy.fitting.noise import (
+    WHITE_NOISE_NAME,
+    check_noise_model_name,
+    compute_ljung_box_p_value,
+)
 from rsfstudy.fitting.record import RECORD_COLUMNS, Record
 from rsfstudy.fitting.window_model import (
     PARAMETERS_OF_SOME_LAWS_ONLY,
@@ -60,7 +64,7 @@ from rsfstudy.status import Status
 
 #: Largest relative tolerance of the integration for which finite differences of the solution are
 #: accurate.
-_RTOL_FOR_FINITE_DIFFERENCES = 1e-9
+_MAX_RTOL_FOR_FINITE_DIFFERENCES = 1e-9
 #: The numerical error of a parameter is divided by a scale, which contains the standard error of
 #: the parameter multiplied by this factor. With this factor, a numerical error of more than 1 % of
 #: the standard error is reported as too large at the default accuracy of 1e-7.
@@ -72,7 +76,7 @@ _SCENE_FIELDS_SET_BY_FIT = (
 )
 #: The direct effect counts as being at its lower bound if the ratio of the direct effect to its
 #: lower bound is less than this value.
-_MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND = 1.001
+_MAX_DIRECT_EFFECT_RATIO_TO_LOWER_BOUND = 1.001
 
 
 @wrap_methods_in_error_boundary
@@ -239,9 +243,9 @@ class Fit(Measure):
         if "step_time" in self.free and self.loading == "recorded":
             rule = "can only be used with loading='steps'"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
-        check_noise_name(self.noise)
+        check_noise_model_name(self.noise)
         Filter.parse(self.filter)
-        posterior.check_sampling_is_possible(self.posterior)
+        posterior.check_posterior_sampling_is_possible(self.posterior)
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
@@ -262,7 +266,9 @@ class Fit(Measure):
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the free parameters, with window numbers in joint fits."""
-        return add_window_numbers(self.free, len(self._fitted_record_names_and_steps))
+        return add_window_numbers_to_parameter_names(
+            self.free, len(self._fitted_record_names_and_steps)
+        )
 
     @property
     def _fitted_record_names_and_steps(self) -> tuple[tuple[str, int], ...]:
@@ -270,7 +276,7 @@ class Fit(Measure):
         return self.together or ((self.record or self.records[0].name, self.step),)
 
     @cached_property
-    def _windows(self) -> tuple[FitWindow, ...]:
+    def _fitted_windows(self) -> tuple[FitWindow, ...]:
         """Windows of the records around the steps to fit."""
         by_name = {record.name: record for record in self.records}
         others = {name: {n for other, n in self.together if other == name} for name in by_name}
@@ -297,7 +303,7 @@ class Fit(Measure):
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the parameters, and indices of the rows and draws."""
         names = np.array(self.parameters, dtype=object)
-        together = sum(map(len, self._records_with_first_rows))
+        together = sum(map(len, self._first_output_row_by_record))
         rows = np.arange(together if self.together else max(map(len, self.records)))
         draws = {"draw": np.arange(self.posterior)} if self.posterior else {}
         return {"parameter": names, "other_parameter": names, "row": rows, **draws}
@@ -372,9 +378,9 @@ class Fit(Measure):
         raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
     @cached_property
-    def _records_with_first_rows(self) -> dict[Record, int]:
+    def _first_output_row_by_record(self) -> dict[Record, int]:
         """Index of the first output row of each fitted record."""
-        records = [*dict.fromkeys(window.record for window in self._windows)]
+        records = [*dict.fromkeys(window.record for window in self._fitted_windows)]
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
@@ -404,14 +410,16 @@ class Fit(Measure):
             return self._insert_nan_for_absent_parameters(
                 replace(self, free=own).compute(scene, integrator)
             )
-        windows = self._windows
+        windows = self._fitted_windows
         search, found = self.solve(scene, integrator)
         model, place = search.model, windows[0].window_properties
-        part = model.models[0]
-        apart = float(np.median(np.diff(part.displacement[part.time >= windows[0].step.start])))
+        part = model.window_models[0]
+        apart = float(
+            np.median(np.diff(part.load_point_displacement[part.time >= windows[0].step.start]))
+        )
         unidentified = find_unidentified_parameters(found, apart)
         rows = [
-            window.record_row_indices + self._records_with_first_rows[window.record]
+            window.record_row_indices + self._first_output_row_by_record[window.record]
             for window in windows
         ]
         values = self._collect_output_values(found, np.concatenate(rows), model)
@@ -426,9 +434,9 @@ class Fit(Measure):
                 f"normal_stress_before_{n}": w.mean_normal_stress_before_step for n, w in stresses
             }
         ends = {
-            name: search.parameter_bounds(name)
+            name: search.compute_parameter_bounds(name)
             if name in unidentified
-            else confidence_interval(search, found, name)
+            else compute_confidence_interval(search, found, name)
             for name in self.parameters
         }
         for name, (low, high) in ends.items():
@@ -439,10 +447,10 @@ class Fit(Measure):
             is_least = (
                 "a" in found.free_parameters
                 and found.parameter_values["a"]
-                < _MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND * search.parameter_bounds("a")[0]
+                < _MAX_DIRECT_EFFECT_RATIO_TO_LOWER_BOUND * search.compute_parameter_bounds("a")[0]
             )
             text = describe_unidentified_parameters(
-                found, unidentified, apart, is_a_at_bound=is_least
+                found, unidentified, apart, direct_effect_is_at_bound=is_least
             )
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         remarks = (
@@ -451,7 +459,7 @@ class Fit(Measure):
         )
         reasons = (
             *self.find_validity_problems(search, found),
-            *describe_asymmetric_intervals(found, ends),
+            *describe_asymmetric_confidence_intervals(found, ends),
         )
         status = Status.ERRORS_NOT_VALID if reasons else Status.OK
         cuts = [cut for window in windows for cut in window.truncation_remarks]
@@ -479,8 +487,8 @@ class Fit(Measure):
         MotionStopped
             If the fit fails.
         """
-        smooth = integrator.tightened_to(_RTOL_FOR_FINITE_DIFFERENCES)
-        windows = self._windows
+        smooth = integrator.tightened_to(_MAX_RTOL_FOR_FINITE_DIFFERENCES)
+        windows = self._fitted_windows
         per_um = self.machine_stiffness * self.slip_distance_guess
         scenes = [w.with_machine_stiffness(scene, per_um) for w in windows]
         of_each = zip(windows, scenes, strict=True)
@@ -491,14 +499,16 @@ class Fit(Measure):
         distances = self.slip_distance_guess, self.slip_distance_2_guess
         first: dict[str, float] = {}
         for number, (part, window) in enumerate(zip(parts, windows, strict=True), start=1):
-            guess = guess_parameters(part, window.step, self.free, distances)
+            guess = guess_initial_parameter_values(part, window.step, self.free, distances)
             first = guess | first
             if len(windows) > 1:
                 first |= {
                     f"{n}_{number}": v for n, v in guess.items() if is_per_window_parameter(n)
                 }
         one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
-        model = JointModel(tuple(parts), compute_stiffness_factors(windows) if one_machine else ())
+        model = JointModel(
+            tuple(parts), compute_stiffness_ratios_to_first_window(windows) if one_machine else ()
+        )
         stderr = 0.0 if "stiffness" in self.free else self.stiffness_relative_stderr
         search = FitProblem(model, first, self.parameters, self.noise, stderr)
         return search, search.solve()
@@ -518,20 +528,25 @@ class Fit(Measure):
         tuple of str
             Reasons why the standard errors are not valid. The tuple is empty if they are valid.
         """
-        reasons = find_validity_problems(solution, problem.model.friction)
+        reasons = find_reasons_for_invalid_stderrs(solution, problem.model.recorded_friction)
         # With recorded loading, any filter would reduce the effect of load point noise, so the test
         # for a filter would be misleading.
         is_recorded = self.loading == "recorded"
-        is_exact = solution.noise_sd < MIN_STATISTICAL_NOISE_SD
+        is_exact = solution.noise_sd < MIN_NOISE_SD_ABOVE_NUMERICAL_ERRORS
         if (
             self.filter
             or is_recorded
             or is_exact
             or self.noise == WHITE_NOISE_NAME
-            or is_rounding_too_coarse(solution)
+            or is_friction_rounding_too_coarse(solution)
         ):
             return reasons
-        return (*detect_unspecified_filter(solution, problem.model.time, self.noise), *reasons)
+        return (
+            *detect_unspecified_filter(
+                solution, problem.model.time_since_first_row_of_window, self.noise
+            ),
+            *reasons,
+        )
 
     def _insert_nan_for_absent_parameters(self, output_values: Outcome) -> Outcome:
         """Insert NaN for parameters that do not occur in the friction law."""
@@ -551,12 +566,12 @@ class Fit(Measure):
         for name in fit_solution.free_parameters:
             values[name], values[f"{name}_error"] = (
                 fit_solution.parameter_values[name],
-                fit_solution.numerical_errors[name],
+                fit_solution.parameter_numerical_errors[name],
             )
-            values[f"{name}_stderr"] = fit_solution.parameter_stderr(name)
-        covariance = fit_solution.coordinate_covariance * np.outer(
-            fit_solution.parameter_derivatives_by_coordinates,
-            fit_solution.parameter_derivatives_by_coordinates,
+            values[f"{name}_stderr"] = fit_solution.compute_parameter_stderr(name)
+        covariance = fit_solution.fit_coordinate_covariance * np.outer(
+            fit_solution.parameter_derivatives_by_fit_coordinates,
+            fit_solution.parameter_derivatives_by_fit_coordinates,
         )
         spread = np.sqrt(np.diag(covariance))
         signs = np.array(
@@ -567,7 +582,7 @@ class Fit(Measure):
             variance_of_rate = float(signs @ covariance @ signs)
         b = sum(fit_solution.parameter_values.get(name, 0.0) for name in ("b", "b1", "b2"))
         trend = joint_model.compute_friction_trend(fit_solution.parameter_values)
-        variance = float(np.var(joint_model.friction)) or math.nan
+        variance = float(np.var(joint_model.recorded_friction)) or math.nan
         values |= {
             "a_minus_b": fit_solution.parameter_values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
@@ -577,7 +592,7 @@ class Fit(Measure):
             "noise_order": fit_solution.noise_model.autoregressive_order,
             "n_eff": fit_solution.noise_model.effective_sample_size,
             "degrees_of_freedom": fit_solution.degrees_of_freedom,
-            "p_value": ljung_box_p_value(
+            "p_value": compute_ljung_box_p_value(
                 fit_solution.whitened_residuals, fit_solution.noise_model.autoregressive_order
             ),
             "r_squared": 1.0 - float(np.var(fit_solution.residuals)) / variance,
@@ -591,10 +606,10 @@ class Fit(Measure):
             "fitted_friction_stderr": fit_solution.fitted_friction_stderr,
             "detrended_friction": fit_solution.model_friction,
             "residual": fit_solution.residuals,
-            "whitened_residual": fit_solution.all_whitened_residuals,
+            "whitened_residual": fit_solution.whitened_residuals_with_nan_outliers,
         }
         for name in (about.name for about in RECORD_COLUMNS[:3]):
-            whole = [record.columns[name] for record in self._records_with_first_rows]
+            whole = [record.columns[name] for record in self._first_output_row_by_record]
             along[f"record_{name}"] = np.concatenate(whole)
         for name, column in along.items():
             values[name] = along_rows = np.full(len(self.inner_coordinates["row"]), math.nan)

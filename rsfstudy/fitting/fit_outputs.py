@@ -51,7 +51,7 @@ _OUTPUTS_PER_RECORD_ROW = tuple(
     )
 )
 #: Suffixes and descriptions of the outputs that belong to each parameter in addition to its value.
-_DESCRIPTIONS_BY_NAME_SUFFIX = {
+_PARAMETER_OUTPUT_DESCRIPTIONS_BY_SUFFIX = {
     "stderr": "standard error",
     "ci_low": "lower end of the 95 % confidence interval",
     "ci_high": "upper end of the 95 % confidence interval",
@@ -111,7 +111,7 @@ def _iterate_outputs_of_parameter(parameter_name: str) -> Iterator[Output]:
     yield Output(
         parameter_name, about.symbol, about.units, about.long_name, error=True, optional=optional
     )
-    for suffix, words in _DESCRIPTIONS_BY_NAME_SUFFIX.items():
+    for suffix, words in _PARAMETER_OUTPUT_DESCRIPTIONS_BY_SUFFIX.items():
         yield Output(
             f"{parameter_name}_{suffix}", "", about.units, f"{words} of the {about.long_name}"
         )

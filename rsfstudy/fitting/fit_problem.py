@@ -39,11 +39,11 @@ from rsfstudy.fitting.window_model import (
     ACCURATE_DIFFERENCE_SCHEME,
     LOGARITHMIC_PARAMETERS,
     QUICK_DIFFERENCE_SCHEME,
-    DifferenceScheme,
+    FiniteDifferenceScheme,
     ParameterValues,
-    coordinate_to_parameter,
-    parameter_derivative_by_coordinate,
-    parameter_to_coordinate,
+    compute_derivative_by_fit_coordinate,
+    fit_coordinate_to_parameter,
+    parameter_to_fit_coordinate,
 )
 from rsfstudy.motion import MotionStopped
 from rsfstudy.status import Status
@@ -61,12 +61,12 @@ _PARAMETER_BOUNDS = {
 _MAX_LOG_STIFFNESS_OVER_GUESS = math.log(1e4)
 #: Upper bound of the slip distance, relative to the load point displacement of the window. The
 #: lower bound of the slip distance is the mean load point displacement between two rows.
-_MAX_SLIP_DISTANCE_OVER_RECORD_LENGTH = 10.0
+_MAX_SLIP_DISTANCE_OVER_DISPLACEMENT = 10.0
 #: The bounds of the logarithm of the second slip distance are shifted by this value from the bounds
 #: for the first slip distance, so that the second slip distance is always longer.
 _MIN_LOG_GAP_BETWEEN_SLIP_DISTANCES = 1e-6
 #: Tested initial values of the slip distance, relative to the initial guess.
-_INITIAL_SLIP_DISTANCE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
+_TESTED_SLIP_DISTANCES_OVER_FIRST_GUESS = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Settings of the search. The first value is the largest number of iterations. Each iteration
 #: estimates the noise and the parameters. The iterations end if the changes in the parameters in
 #: standard errors are smaller than the second value. The third value is the largest number of model
@@ -102,7 +102,7 @@ _MIN_DEGREES_OF_FREEDOM = 3.0
 _MAX_STDERR_OF_IDENTIFIED_PARAMETER, _MIN_EVOLUTION_EFFECT_SIGMAS = 0.5, 2.0
 #: Smallest difference between the AIC of the model without a response to the steps and the AIC of
 #: the model with a response. If the difference is smaller, the record shows no response.
-_MIN_AIC_GAIN_FROM_STEPS = 10.0
+_MIN_AIC_DECREASE_BY_STEP_RESPONSE = 10.0
 
 
 class FitProblem:
@@ -148,20 +148,20 @@ class FitProblem:
         self.initial_values, self.has_converged = dict(initial_values), True
         self.ordinary_least_squares_residuals = np.zeros(0)
         self.friction_rounding_quantum = max(
-            find_rounding_quantum(part) for part in model.friction_per_window
+            find_rounding_quantum(part) for part in model.recorded_friction_per_window
         )
         self.lower_bounds, self.upper_bounds = np.array(
-            [self._coordinate_bounds(name) for name in free_parameters]
+            [self._compute_fit_coordinate_bounds(name) for name in free_parameters]
         ).T
 
-    def _coordinate_bounds(self, parameter_name: str) -> tuple[float, float]:
+    def _compute_fit_coordinate_bounds(self, parameter_name: str) -> tuple[float, float]:
         """Return the lower and upper bounds of a free parameter's coordinate."""
         if parameter_name.startswith("slip_distance"):
-            moved = self.model.displacement
+            moved = self.model.load_point_displacement
             extent = float(np.ptp(moved))
             low, high = (
                 math.log(extent / len(moved)),
-                math.log(_MAX_SLIP_DISTANCE_OVER_RECORD_LENGTH * extent),
+                math.log(_MAX_SLIP_DISTANCE_OVER_DISPLACEMENT * extent),
             )
             # If both slip distances are at a bound, the second slip distance is longer.
             return (
@@ -173,11 +173,11 @@ class FitProblem:
             at = math.log(self.initial_values[parameter_name])
             return at - _MAX_LOG_STIFFNESS_OVER_GUESS, at + _MAX_LOG_STIFFNESS_OVER_GUESS
         if parameter_name.startswith("step_time"):
-            late = self.model.max_loading_delay(parameter_name)
+            late = self.model.find_longest_allowed_loading_delay(parameter_name)
             return -late, late
         return _PARAMETER_BOUNDS.get(parameter_name, (-math.inf, math.inf))
 
-    def coordinates_to_values(self, coordinates: np.ndarray) -> dict[str, float]:
+    def fit_coordinates_to_parameter_values(self, fit_coordinates: np.ndarray) -> dict[str, float]:
         """Convert coordinates to the values of all parameters.
 
         Parameters
@@ -190,10 +190,12 @@ class FitProblem:
         dict of {str: float}
             Values of all parameters.
         """
-        found = zip(self.free_parameters, coordinates.tolist(), strict=True)
-        return self.initial_values | {name: coordinate_to_parameter(name, v) for name, v in found}
+        found = zip(self.free_parameters, fit_coordinates.tolist(), strict=True)
+        return self.initial_values | {
+            name: fit_coordinate_to_parameter(name, v) for name, v in found
+        }
 
-    def values_to_coordinates(self, values: ParameterValues) -> np.ndarray:
+    def parameter_values_to_fit_coordinates(self, parameter_values: ParameterValues) -> np.ndarray:
         """Convert the values of parameters to coordinates.
 
         Parameters
@@ -207,10 +209,15 @@ class FitProblem:
             Coordinates of the free parameters.
         """
         return np.array(
-            [parameter_to_coordinate(name, values[name]) for name in self.free_parameters]
+            [
+                parameter_to_fit_coordinate(name, parameter_values[name])
+                for name in self.free_parameters
+            ]
         )
 
-    def residuals(self, values: ParameterValues, *, require_stable: bool = False) -> np.ndarray:
+    def compute_residuals(
+        self, parameter_values: ParameterValues, *, require_stable: bool = False
+    ) -> np.ndarray:
         """Compute the residuals: recorded friction minus model friction and trend.
 
         Parameters
@@ -225,17 +232,25 @@ class FitProblem:
         ndarray, shape (rows,)
             Residuals. If the simulation of a window fails, the residuals of the window are NaN.
         """
-        curve = self.model.model_friction(values, require_stable=require_stable)
-        return np.asarray(self.model.friction - curve - self.model.compute_friction_trend(values))
+        curve = self.model.compute_model_friction(parameter_values, require_stable=require_stable)
+        return np.asarray(
+            self.model.recorded_friction
+            - curve
+            - self.model.compute_friction_trend(parameter_values)
+        )
 
-    def _jacobian(self, coordinates: np.ndarray, difference_scheme: DifferenceScheme) -> np.ndarray:
+    def _compute_jacobian(
+        self, fit_coordinates: np.ndarray, difference_scheme: FiniteDifferenceScheme
+    ) -> np.ndarray:
         """Compute the Jacobian matrix of the model friction.
 
         The Jacobian contains the derivatives with respect to the coordinates of the free
         parameters. A derivative is set to 0 if a simulation for its finite difference fails.
         """
-        found = self.model.jacobian(
-            self.coordinates_to_values(coordinates), self.free_parameters, difference_scheme
+        found = self.model.compute_jacobian(
+            self.fit_coordinates_to_parameter_values(fit_coordinates),
+            self.free_parameters,
+            difference_scheme,
         )
         return np.where(np.isfinite(found).all(axis=0), found, 0.0)
 
@@ -253,16 +268,19 @@ class FitProblem:
             If all simulations of the record fail, if the work budget is exhausted, or if the search
             does not converge although the record constrains all parameters.
         """
-        x, noise = self._initial_coordinates(), noises.build_white_noise_model(self.model.time)
+        x, noise = (
+            self._find_initial_fit_coordinates(),
+            noises.build_white_noise_model(self.model.time_since_first_row_of_window),
+        )
         for number in range(
             1
             if self.noise_model_name == noises.WHITE_NOISE_NAME
-            and len(noise.noise_level_standard_deviations) == 1
+            and len(noise.relative_noise_levels) == 1
             else _MAX_NOISE_ESTIMATION_PASSES
         ):
             before = x
             x, jacobian = self.minimise_weighted_squares(x, noise)
-            left = self.residuals(self.coordinates_to_values(x))
+            left = self.compute_residuals(self.fit_coordinates_to_parameter_values(x))
             if not number:
                 self.ordinary_least_squares_residuals = left
             if number and _has_converged(
@@ -270,12 +288,12 @@ class FitProblem:
             ):
                 break
             kept = find_non_outlier_mask(
-                left, self.model.friction - left, self.friction_rounding_quantum
+                left, self.model.recorded_friction - left, self.friction_rounding_quantum
             )
             least = self.friction_rounding_quantum / math.sqrt(12.0)
-            noise = noises.fit_noise(
+            noise = noises.fit_noise_model(
                 self.noise_model_name,
-                self.model.time,
+                self.model.time_since_first_row_of_window,
                 left,
                 jacobian,
                 kept,
@@ -288,7 +306,7 @@ class FitProblem:
             raise MotionStopped(Status.ACCURACY_OUT_OF_REACH, text)
         return found
 
-    def _initial_coordinates(self) -> np.ndarray:
+    def _find_initial_fit_coordinates(self) -> np.ndarray:
         """Return the initial coordinates with the best slip distance.
 
         The method tests several initial slip distances, and selects the slip distance with the
@@ -296,20 +314,26 @@ class FitProblem:
         """
         # Check the initial guess, because the search treats invalid parameters like failed
         # simulations.
-        self.model.check_parameters(self.initial_values)
+        self.model.check_parameters_define_valid_scenes(self.initial_values)
         scales = (
-            _INITIAL_SLIP_DISTANCE_FACTORS if "slip_distance" in self.free_parameters else (1.0,)
+            _TESTED_SLIP_DISTANCES_OVER_FIRST_GUESS
+            if "slip_distance" in self.free_parameters
+            else (1.0,)
         )
         distances = [n for n in ("slip_distance", "slip_distance_2") if n in self.free_parameters]
         linear = [n for n in self.free_parameters if self.model.is_linear_in_parameter(n)]
-        columns = self.model.jacobian(self.initial_values, linear) if linear else None
+        columns = self.model.compute_jacobian(self.initial_values, linear) if linear else None
         best = (math.inf, self.initial_values)
         for scale in scales:
             values = self.initial_values | {n: self.initial_values[n] * scale for n in distances}
-            values = self.coordinates_to_values(
-                np.clip(self.values_to_coordinates(values), self.lower_bounds, self.upper_bounds)
+            values = self.fit_coordinates_to_parameter_values(
+                np.clip(
+                    self.parameter_values_to_fit_coordinates(values),
+                    self.lower_bounds,
+                    self.upper_bounds,
+                )
             )
-            left = self.residuals(values, require_stable=True)
+            left = self.compute_residuals(values, require_stable=True)
             if columns is not None and np.isfinite(left).all():
                 moved = np.linalg.lstsq(columns, left)[0]
                 left = left - columns @ moved
@@ -318,12 +342,12 @@ class FitProblem:
         if not math.isfinite(best[0]):
             text = "the motion for the first guess cannot be computed, or the stiffness is below "
             raise MotionStopped(Status.NOT_APPLICABLE, f"{text}the critical stiffness")
-        return self.values_to_coordinates(best[1])
+        return self.parameter_values_to_fit_coordinates(best[1])
 
     def minimise_weighted_squares(
         self,
-        initial_coordinates: np.ndarray,
-        noise: NoiseModel,
+        initial_fit_coordinates: np.ndarray,
+        noise_model: NoiseModel,
         cost_tolerance: float = _LEAST_SQUARES_XTOL,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Minimise the sum of squared whitened residuals for a fixed noise model.
@@ -350,20 +374,24 @@ class FitProblem:
         derivatives = {}
 
         def left(x: np.ndarray) -> np.ndarray:
-            found = self.residuals(self.coordinates_to_values(x), require_stable=True)
-            return np.asarray(noise.whiten_columns(found[:, None])[:, 0] / scale)
+            found = self.compute_residuals(
+                self.fit_coordinates_to_parameter_values(x), require_stable=True
+            )
+            return np.asarray(noise_model.whiten_columns(found[:, None])[:, 0] / scale)
 
         def slopes(x: np.ndarray) -> np.ndarray:
-            derivatives["last"] = self._jacobian(x, QUICK_DIFFERENCE_SCHEME)
-            return -noise.whiten_columns(derivatives["last"]) / scale
+            derivatives["last"] = self._compute_jacobian(x, QUICK_DIFFERENCE_SCHEME)
+            return -noise_model.whiten_columns(derivatives["last"]) / scale
 
         scale = 1.0
-        inner = np.clip(initial_coordinates, self.lower_bounds + 1e-9, self.upper_bounds - 1e-9)
+        inner = np.clip(initial_fit_coordinates, self.lower_bounds + 1e-9, self.upper_bounds - 1e-9)
         scale = math.sqrt(float(np.square(left(inner)).mean())) or 1.0
         # The simulation at the initial coordinates fails, so the search cannot start.
         if not math.isfinite(scale):
             self.has_converged = True
-            return initial_coordinates, self._jacobian(initial_coordinates, QUICK_DIFFERENCE_SCHEME)
+            return initial_fit_coordinates, self._compute_jacobian(
+                initial_fit_coordinates, QUICK_DIFFERENCE_SCHEME
+            )
         bounds = self.lower_bounds, self.upper_bounds
         found = least_squares(
             left, inner, slopes, bounds, ftol=cost_tolerance, **_LEAST_SQUARES_OPTIONS
@@ -371,7 +399,7 @@ class FitProblem:
         self.has_converged = found.status != 0
         return found.x, derivatives["last"]
 
-    def _build_solution(self, coordinates: np.ndarray, noise: NoiseModel) -> FitSolution:
+    def _build_solution(self, fit_coordinates: np.ndarray, noise_model: NoiseModel) -> FitSolution:
         """Compute the final parameters, their errors and the noise.
 
         First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
@@ -383,24 +411,26 @@ class FitProblem:
         """
         change = math.inf
         for number in range(_NEWTON_STEP_COUNT_LIMITS[2]):
-            jacobian = self._jacobian(coordinates, ACCURATE_DIFFERENCE_SCHEME)
-            left = self.residuals(self.coordinates_to_values(coordinates))
-            whitened = noise.whiten_columns(np.column_stack([jacobian, left]))
+            jacobian = self._compute_jacobian(fit_coordinates, ACCURATE_DIFFERENCE_SCHEME)
+            left = self.compute_residuals(self.fit_coordinates_to_parameter_values(fit_coordinates))
+            whitened = noise_model.whiten_columns(np.column_stack([jacobian, left]))
             if not np.isfinite(whitened).all():
                 raise MotionStopped(
                     Status.INTEGRATION_FAILED, "the motion for the best fit cannot be computed"
                 )
             beyond = np.clip(
-                coordinates + _solve_linear_least_squares(whitened),
+                fit_coordinates + _solve_linear_least_squares(whitened),
                 self.lower_bounds,
                 self.upper_bounds,
             )
-            moved = beyond - coordinates
+            moved = beyond - fit_coordinates
             before, change = change, float(np.linalg.norm(whitened[:, :-1] @ moved))
             if np.isfinite(
-                self.residuals(self.coordinates_to_values(beyond), require_stable=True)
+                self.compute_residuals(
+                    self.fit_coordinates_to_parameter_values(beyond), require_stable=True
+                )
             ).all():
-                coordinates = beyond
+                fit_coordinates = beyond
             if number + 1 >= _NEWTON_STEP_COUNT_LIMITS[0] and _has_converged(
                 moved, whitened, _NEWTON_STEP_TOLERANCE_IN_STDERRS
             ):
@@ -412,43 +442,52 @@ class FitProblem:
                 and not change < _MAX_NEWTON_STEP_SHRINK_RATIO * before
             ):
                 break
-        values = self.coordinates_to_values(coordinates)
-        curve = self.model.model_friction(values)
-        left = self.model.friction - curve - self.model.compute_friction_trend(values)
-        innovations = noise.whiten_columns(left[:, None])[:, 0]
+        values = self.fit_coordinates_to_parameter_values(fit_coordinates)
+        curve = self.model.compute_model_friction(values)
+        left = self.model.recorded_friction - curve - self.model.compute_friction_trend(values)
+        innovations = noise_model.whiten_columns(left[:, None])[:, 0]
         count = len(innovations)
-        free_of = count - len(coordinates)
+        free_of = count - len(fit_coordinates)
         size = math.sqrt(float(innovations @ innovations) / free_of)
-        inverse = _inverse_normal_matrix(whitened[:, :-1])
+        inverse = _compute_inverse_normal_matrix(whitened[:, :-1])
         by_noise = covariance = size**2 * inverse
         moved_by = self.model.compute_loading_error_sensitivity(values)
         if moved_by.size and np.isfinite(inverse).all():
-            shifts = inverse @ whitened[:, :-1].T @ noise.whiten_columns(moved_by)
+            shifts = inverse @ whitened[:, :-1].T @ noise_model.whiten_columns(moved_by)
             covariance = by_noise + shifts @ shifts.T
-        by_stiffness = self._covariance_by_stiffness(values, inverse, whitened, noise)
+        by_stiffness = self._compute_covariance_from_stiffness_error(
+            values, inverse, whitened, noise_model
+        )
         covariance = covariance + by_stiffness
         degrees = max(
-            noise.degrees_of_freedom_of_slow_noise * free_of / count, _MIN_DEGREES_OF_FREEDOM
+            noise_model.low_frequency_noise_degrees_of_freedom * free_of / count,
+            _MIN_DEGREES_OF_FREEDOM,
         )
-        finer = self.model.model_friction(values, with_refined_tolerances=True) - curve
+        finer = self.model.compute_model_friction(values, with_refined_tolerances=True) - curve
         with np.errstate(invalid="ignore"):  # The inverse is infinite if a derivative is zero.
-            off = np.abs(inverse @ whitened[:, :-1].T @ noise.whiten_columns(finer[:, None])[:, 0])
+            off = np.abs(
+                inverse @ whitened[:, :-1].T @ noise_model.whiten_columns(finer[:, None])[:, 0]
+            )
         slopes = [
-            parameter_derivative_by_coordinate(name, values[name]) for name in self.free_parameters
+            compute_derivative_by_fit_coordinate(name, values[name])
+            for name in self.free_parameters
         ]
         errors = (3.0 * off + np.abs(moved)) * slopes
-        criterion = compute_aic(innovations, noise, len(coordinates), len(left))
+        criterion = compute_aic(innovations, noise_model, len(fit_coordinates), len(left))
         steps = (
-            self._compute_aic_without_steps(jacobian, noise) - criterion > _MIN_AIC_GAIN_FROM_STEPS
+            self._compute_aic_without_step_response(jacobian, noise_model) - criterion
+            > _MIN_AIC_DECREASE_BY_STEP_RESPONSE
         )
         return FitSolution(
             parameter_values=values,
             free_parameters=self.free_parameters,
-            coordinate_covariance=covariance,
-            noise_caused_covariance=by_noise,
-            stiffness_caused_covariance=by_stiffness,
-            numerical_errors=dict(zip(self.free_parameters, errors.tolist(), strict=True)),
-            noise_model=noise,
+            fit_coordinate_covariance=covariance,
+            fit_coordinate_covariance_from_noise=by_noise,
+            fit_coordinate_covariance_from_stiffness=by_stiffness,
+            parameter_numerical_errors=dict(
+                zip(self.free_parameters, errors.tolist(), strict=True)
+            ),
+            noise_model=noise_model,
             noise_sd=size,
             degrees_of_freedom=degrees,
             model_friction=curve,
@@ -458,31 +497,43 @@ class FitProblem:
             loading_error_sensitivity=moved_by,
             aic=criterion,
             unidentified_parameters=self._find_unidentified_parameters(
-                coordinates, values, covariance, steps
+                fit_coordinates, values, covariance, steps
             ),
             ols_residual_rms=float(
                 np.sqrt(
-                    np.mean(np.square(noise.drop_outliers(self.ordinary_least_squares_residuals)))
+                    np.mean(
+                        np.square(
+                            noise_model.drop_outlier_rows(self.ordinary_least_squares_residuals)
+                        )
+                    )
                 )
             ),
             friction_rounding_quantum=self.friction_rounding_quantum,
         )
 
-    def _covariance_by_stiffness(
+    def _compute_covariance_from_stiffness_error(
         self,
-        values: ParameterValues,
+        parameter_values: ParameterValues,
         inverse_normal_matrix: np.ndarray,
-        whitened: np.ndarray,
-        noise: NoiseModel,
+        whitened_jacobian_and_residuals: np.ndarray,
+        noise_model: NoiseModel,
     ) -> np.ndarray:
         """Return the covariance due to the standard error of a fixed stiffness."""
         if not (self.stiffness_relative_stderr and np.isfinite(inverse_normal_matrix).all()):
             return np.zeros_like(inverse_normal_matrix)
-        by_stiffness = self.stiffness_relative_stderr * self.model.jacobian(values, ["stiffness"])
-        shifts = inverse_normal_matrix @ whitened[:, :-1].T @ noise.whiten_columns(by_stiffness)
+        by_stiffness = self.stiffness_relative_stderr * self.model.compute_jacobian(
+            parameter_values, ["stiffness"]
+        )
+        shifts = (
+            inverse_normal_matrix
+            @ whitened_jacobian_and_residuals[:, :-1].T
+            @ noise_model.whiten_columns(by_stiffness)
+        )
         return np.asarray(shifts @ shifts.T)
 
-    def _compute_aic_without_steps(self, jacobian: np.ndarray, noise: NoiseModel) -> float:
+    def _compute_aic_without_step_response(
+        self, jacobian: np.ndarray, noise_model: NoiseModel
+    ) -> float:
         """Compute the AIC of a model without a response to the steps.
 
         The model without a response contains only trends and has a = b = 0. The computation uses
@@ -490,29 +541,40 @@ class FitProblem:
         response to the steps as correlated noise.
         """
         linear = [self.model.is_linear_in_parameter(name) for name in self.free_parameters]
-        columns = np.column_stack([jacobian[:, linear], self.model.friction])
+        columns = np.column_stack([jacobian[:, linear], self.model.recorded_friction])
         if not any(name.startswith("mu_star") for name in self.free_parameters):
             columns = np.insert(columns, 0, 1.0, axis=1)
-        whitened = noise.whiten_columns(columns)
+        whitened = noise_model.whiten_columns(columns)
         innovations = whitened[:, -1] - whitened[:, :-1] @ _solve_linear_least_squares(whitened)
-        return compute_aic(innovations, noise, columns.shape[1] - 1, len(columns))
+        return compute_aic(innovations, noise_model, columns.shape[1] - 1, len(columns))
 
     def _find_unidentified_parameters(
         self,
-        coordinates: np.ndarray,
-        values: ParameterValues,
-        covariance: np.ndarray,
-        difference_steps: bool,
+        fit_coordinates: np.ndarray,
+        parameter_values: ParameterValues,
+        fit_coordinate_covariance: np.ndarray,
+        friction_responds_to_steps: bool,
     ) -> tuple[str, ...]:
         """Return the free parameters that the record does not constrain.
 
         If the record shows no response to the steps, it can constrain only parameters with a linear
         effect on friction.
         """
-        spread = dict(zip(self.free_parameters, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-        bound = (coordinates - self.lower_bounds < 1e-6) | (self.upper_bounds - coordinates < 1e-6)
-        effects = {"slip_distance": "b" if "b" in values else "b1", "slip_distance_2": "b2"}
-        largest = max(abs(values.get(n, 0.0)) for n in ("a", "b", "b1", "b2"))
+        spread = dict(
+            zip(
+                self.free_parameters,
+                np.sqrt(np.diag(fit_coordinate_covariance)).tolist(),
+                strict=True,
+            )
+        )
+        bound = (fit_coordinates - self.lower_bounds < 1e-6) | (
+            self.upper_bounds - fit_coordinates < 1e-6
+        )
+        effects = {
+            "slip_distance": "b" if "b" in parameter_values else "b1",
+            "slip_distance_2": "b2",
+        }
+        largest = max(abs(parameter_values.get(n, 0.0)) for n in ("a", "b", "b1", "b2"))
         found = []
         for name, at_bound in zip(self.free_parameters, bound.tolist(), strict=True):
             told = math.isfinite(spread[name])
@@ -524,12 +586,18 @@ class FitProblem:
                 told = spread[name] < _MAX_STDERR_OF_IDENTIFIED_PARAMETER * largest and not at_bound
             effect = effects.get(name, "")
             if effect in spread:
-                told = told and abs(values[effect]) > _MIN_EVOLUTION_EFFECT_SIGMAS * spread[effect]
-            if not told or not (difference_steps or self.model.is_linear_in_parameter(name)):
+                told = (
+                    told
+                    and abs(parameter_values[effect])
+                    > _MIN_EVOLUTION_EFFECT_SIGMAS * spread[effect]
+                )
+            if not told or not (
+                friction_responds_to_steps or self.model.is_linear_in_parameter(name)
+            ):
                 found.append(name)
         return tuple(found)
 
-    def parameter_bounds(self, parameter_name: str) -> tuple[float, float]:
+    def compute_parameter_bounds(self, parameter_name: str) -> tuple[float, float]:
         """Return the bounds of a parameter in the search.
 
         Parameters
@@ -547,24 +615,28 @@ class FitProblem:
         place = self.free_parameters.index(parameter_name)
         ends = self.lower_bounds[place], self.upper_bounds[place]
         low, high = (
-            coordinate_to_parameter(parameter_name, v) if math.isfinite(v) else math.nan
+            fit_coordinate_to_parameter(parameter_name, v) if math.isfinite(v) else math.nan
             for v in ends
         )
         return low, high
 
 
-def _solve_linear_least_squares(columns: np.ndarray) -> np.ndarray:
+def _solve_linear_least_squares(predictor_and_target_columns: np.ndarray) -> np.ndarray:
     """Compute the coefficients of a linear least-squares problem.
 
     The last column of the array is approximated by a linear combination of the other columns. The
     result contains the coefficients of the other columns.
     """
-    return np.asarray(np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0])
+    return np.asarray(
+        np.linalg.lstsq(predictor_and_target_columns[:, :-1], predictor_and_target_columns[:, -1])[
+            0
+        ]
+    )
 
 
 def _has_converged(
-    last_coordinate_change: np.ndarray,
-    whitened_jacobian: np.ndarray,
+    last_fit_coordinate_change: np.ndarray,
+    whitened_jacobian_and_residuals: np.ndarray,
     tolerance: float = _NOISE_PASS_TOLERANCE,
 ) -> bool:
     """Return True if the last parameter changes are much smaller than their errors.
@@ -579,12 +651,16 @@ def _has_converged(
         Largest change in the coordinate of a parameter, as a fraction of the standard error of the
         coordinate.
     """
-    size = np.linalg.norm(whitened_jacobian[:, -1]) / math.sqrt(len(whitened_jacobian))
-    spread = size * np.sqrt(np.diag(_inverse_normal_matrix(whitened_jacobian[:, :-1])))
-    return bool((np.abs(last_coordinate_change) <= tolerance * spread).all())
+    size = np.linalg.norm(whitened_jacobian_and_residuals[:, -1]) / math.sqrt(
+        len(whitened_jacobian_and_residuals)
+    )
+    spread = size * np.sqrt(
+        np.diag(_compute_inverse_normal_matrix(whitened_jacobian_and_residuals[:, :-1]))
+    )
+    return bool((np.abs(last_fit_coordinate_change) <= tolerance * spread).all())
 
 
-def _inverse_normal_matrix(jacobian: np.ndarray) -> np.ndarray:
+def _compute_inverse_normal_matrix(jacobian: np.ndarray) -> np.ndarray:
     """Compute the inverse of the normal matrix, :math:`(J^T J)^{-1}`.
 
     All elements of the result are infinite if a column of :math:`J` is zero or not finite.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsfstudy.fitting.noise import NoiseModel
-from rsfstudy.fitting.window_model import parameter_derivative_by_coordinate
+from rsfstudy.fitting.window_model import compute_derivative_by_fit_coordinate
 
 
 @dataclass(frozen=True)
@@ -68,10 +68,10 @@ class FitSolution:
 
     parameter_values: dict[str, float]
     free_parameters: tuple[str, ...]
-    coordinate_covariance: np.ndarray
-    noise_caused_covariance: np.ndarray
-    stiffness_caused_covariance: np.ndarray
-    numerical_errors: dict[str, float]
+    fit_coordinate_covariance: np.ndarray
+    fit_coordinate_covariance_from_noise: np.ndarray
+    fit_coordinate_covariance_from_stiffness: np.ndarray
+    parameter_numerical_errors: dict[str, float]
     noise_model: NoiseModel
     noise_sd: float
     degrees_of_freedom: float
@@ -92,26 +92,26 @@ class FitSolution:
         return np.zeros(0, dtype=int) if kept is None else np.flatnonzero(~kept)
 
     @property
-    def all_whitened_residuals(self) -> np.ndarray:
+    def whitened_residuals_with_nan_outliers(self) -> np.ndarray:
         """Whitened residuals of all rows, with NaN for outliers."""
         return np.insert(
             self.whitened_residuals, self.outlier_rows - np.arange(len(self.outlier_rows)), np.nan
         )
 
     @property
-    def parameter_derivatives_by_coordinates(self) -> np.ndarray:
+    def parameter_derivatives_by_fit_coordinates(self) -> np.ndarray:
         """Derivatives of parameters with respect to their coordinates."""
         return np.array(
             [
-                parameter_derivative_by_coordinate(name, self.parameter_values[name])
+                compute_derivative_by_fit_coordinate(name, self.parameter_values[name])
                 for name in self.free_parameters
             ]
         )
 
     @property
-    def coordinate_stderr(self) -> np.ndarray:
+    def fit_coordinate_stderr(self) -> np.ndarray:
         """Standard errors of the coordinates of the free parameters."""
-        return np.asarray(np.sqrt(np.diag(self.coordinate_covariance)))
+        return np.asarray(np.sqrt(np.diag(self.fit_coordinate_covariance)))
 
     @property
     def fitted_friction_stderr(self) -> np.ndarray:
@@ -121,12 +121,12 @@ class FitSolution:
         the Jacobian and :math:`C` is the covariance matrix.
         """
         variances = np.einsum(
-            "ij,jk,ik->i", self.jacobian, self.coordinate_covariance, self.jacobian
+            "ij,jk,ik->i", self.jacobian, self.fit_coordinate_covariance, self.jacobian
         )
         # Rounding errors may cause negative variances if a parameter is not constrained.
         return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
-    def parameter_stderr(self, parameter_name: str) -> float:
+    def compute_parameter_stderr(self, parameter_name: str) -> float:
         """Return the standard error of a parameter.
 
         Parameters
@@ -140,14 +140,14 @@ class FitSolution:
             Standard error in the unit of the parameter.
         """
         return float(
-            (self.coordinate_stderr * self.parameter_derivatives_by_coordinates)[
+            (self.fit_coordinate_stderr * self.parameter_derivatives_by_fit_coordinates)[
                 self.free_parameters.index(parameter_name)
             ]
         )
 
 
 def compute_aic(
-    whitened_residuals: np.ndarray, noise: NoiseModel, parameter_count: int, row_count: int
+    whitened_residuals: np.ndarray, noise_model: NoiseModel, parameter_count: int, row_count: int
 ) -> float:
     r"""Compute the corrected Akaike information criterion.
 
@@ -187,10 +187,11 @@ def compute_aic(
     )
     every = (
         parameter_count
-        + noise.partial_autocorrelations.size
-        + len(noise.noise_level_standard_deviations)
+        + noise_model.partial_autocorrelations.size
+        + len(noise_model.relative_noise_levels)
     )
     likelihood = (
-        row_count * (math.log(2.0 * math.pi * size / row_count) + 1.0) + noise.log_determinant
+        row_count * (math.log(2.0 * math.pi * size / row_count) + 1.0)
+        + noise_model.correlation_log_determinant
     )
     return likelihood + 2.0 * every * row_count / max(row_count - every - 1.0, 1.0)

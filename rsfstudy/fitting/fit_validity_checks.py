@@ -14,20 +14,20 @@ import numpy as np
 
 from rsfstudy.fitting.fit_solution import FitSolution
 from rsfstudy.fitting.joint_model import strip_window_number
-from rsfstudy.fitting.noise import ljung_box_p_value
-from rsfstudy.fitting.whiteness_test import LAG_COUNT
+from rsfstudy.fitting.noise import compute_ljung_box_p_value
+from rsfstudy.fitting.whiteness_test import LAG_COUNT_BEYOND_NOISE_ORDER
 from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
-from rsfstudy.formatting import pluralize
+from rsfstudy.formatting import format_count_with_noun
 
 #: Names of the parameters that are slip distances.
 SLIP_DISTANCE_PARAMETER_NAMES = ("slip_distance", "slip_distance_2")
 #: Significance level of the test for autocorrelated whitened residuals.
-SIGNIFICANCE_LEVEL = 0.01
+WHITENESS_TEST_SIGNIFICANCE_LEVEL = 0.01
 #: Standard deviation of friction below which the residuals are numerical errors rather than noise.
-MIN_STATISTICAL_NOISE_SD = 1e-7
+MIN_NOISE_SD_ABOVE_NUMERICAL_ERRORS = 1e-7
 #: Largest ratio of the root mean square residual of a fit to the root mean square residual of an
 #: ordinary least-squares fit.
-_MAX_RESIDUAL_SD_OVER_LEAST_SQUARES = 2.0
+_MAX_RESIDUAL_RMS_OVER_OLS_RESIDUAL_RMS = 2.0
 #: Rounding errors depend on friction if the ratio of the noise to the rounding unit of friction is
 #: less than the first value. The second value is the largest fraction of rows that may be outliers.
 _MIN_FRICTION_NOISE_PER_QUANTUM, _MAX_OUTLIER_FRACTION = 0.4, 0.05
@@ -40,7 +40,9 @@ _MAX_CONFIDENCE_INTERVAL_ASYMMETRY = 3.0
 _MAX_LISTED_OUTLIERS = 10
 
 
-def find_validity_problems(solution: FitSolution, recorded_friction: np.ndarray) -> tuple[str, ...]:
+def find_reasons_for_invalid_stderrs(
+    fit_solution: FitSolution, recorded_friction: np.ndarray
+) -> tuple[str, ...]:
     """Return the reasons why the standard errors of a fit are not valid.
 
     Parameters
@@ -55,18 +57,18 @@ def find_validity_problems(solution: FitSolution, recorded_friction: np.ndarray)
     tuple of str
         Reasons why the standard errors are not valid. The tuple is empty if they are valid.
     """
-    if solution.noise_sd < MIN_STATISTICAL_NOISE_SD:
+    if fit_solution.noise_sd < MIN_NOISE_SD_ABOVE_NUMERICAL_ERRORS:
         return ()
     return (
-        *_check_misfit_is_small(solution, recorded_friction),
-        *_check_rounding_is_below_noise(solution),
-        *_check_outlier_count(solution),
-        *_check_residuals_are_white(solution),
+        *_yield_warning_if_misfit_is_large(fit_solution, recorded_friction),
+        *_yield_warning_if_rounding_is_coarse(fit_solution),
+        *_yield_warning_if_outliers_are_many(fit_solution),
+        *_yield_warning_if_residuals_correlate(fit_solution),
     )
 
 
-def describe_asymmetric_intervals(
-    solution: FitSolution, interval_ends: Mapping[str, tuple[float, float]]
+def describe_asymmetric_confidence_intervals(
+    fit_solution: FitSolution, interval_ends: Mapping[str, tuple[float, float]]
 ) -> tuple[str, ...]:
     """Describe the parameters with very asymmetric confidence intervals.
 
@@ -89,11 +91,11 @@ def describe_asymmetric_intervals(
     reasons = []
     for name in (
         n
-        for n in solution.free_parameters
+        for n in fit_solution.free_parameters
         if strip_window_number(n) in LOGARITHMIC_PARAMETERS and min(interval_ends[n]) > 0.0
     ):
         below, above = (
-            abs(math.log(end / solution.parameter_values[name])) for end in interval_ends[name]
+            abs(math.log(end / fit_solution.parameter_values[name])) for end in interval_ends[name]
         )
         if max(below, above) > _MAX_CONFIDENCE_INTERVAL_ASYMMETRY * min(below, above):
             low, high = interval_ends[name]
@@ -123,38 +125,42 @@ def describe_outliers(outlier_rows: np.ndarray) -> str:
         return ""
     names = ", ".join(str(row + 1) for row in outlier_rows[:_MAX_LISTED_OUTLIERS].tolist())
     more = " and more" * (len(outlier_rows) > _MAX_LISTED_OUTLIERS)
-    count = pluralize(len(outlier_rows), "outlier")
+    count = format_count_with_noun(len(outlier_rows), "outlier")
     verb = "was" if len(outlier_rows) == 1 else "were"
     return f"{count} {verb} omitted: rows {names}{more} of the window"
 
 
-def _check_misfit_is_small(solution: FitSolution, recorded_friction: np.ndarray) -> Iterator[str]:
+def _yield_warning_if_misfit_is_large(
+    fit_solution: FitSolution, recorded_friction: np.ndarray
+) -> Iterator[str]:
     """Yield a warning message if the residuals of the fit are too large."""
-    size = float(np.sqrt(np.mean(solution.noise_model.drop_outliers(solution.residuals) ** 2)))
+    size = float(
+        np.sqrt(np.mean(fit_solution.noise_model.drop_outlier_rows(fit_solution.residuals) ** 2))
+    )
     if not size < np.std(recorded_friction):
         yield (
             "the fit is not better than a constant (R2 is not positive). Check the step, the "
             "stiffness and the law"
         )
-    elif size > _MAX_RESIDUAL_SD_OVER_LEAST_SQUARES * solution.ols_residual_rms:
+    elif size > _MAX_RESIDUAL_RMS_OVER_OLS_RESIDUAL_RMS * fit_solution.ols_residual_rms:
         yield (
-            f"the residuals ({size:.2g}) are {size / solution.ols_residual_rms:.1f} times as "
+            f"the residuals ({size:.2g}) are {size / fit_solution.ols_residual_rms:.1f} times as "
             "large as those of an ordinary least-squares fit, so part of the response is "
             "attributed to noise. Check the time of the step, the trend and the law"
         )
 
 
-def _check_rounding_is_below_noise(solution: FitSolution) -> Iterator[str]:
+def _yield_warning_if_rounding_is_coarse(fit_solution: FitSolution) -> Iterator[str]:
     """Yield a warning message if the rounding of friction is too coarse."""
-    if is_rounding_too_coarse(solution):
+    if is_friction_rounding_too_coarse(fit_solution):
         yield (
-            f"friction is rounded to {solution.friction_rounding_quantum:.2g}, more than 2.5 "
+            f"friction is rounded to {fit_solution.friction_rounding_quantum:.2g}, more than 2.5 "
             "times the noise, so rounding errors are not random. Export the record with more "
             "digits"
         )
 
 
-def is_rounding_too_coarse(solution: FitSolution) -> bool:
+def is_friction_rounding_too_coarse(fit_solution: FitSolution) -> bool:
     """Return True if the rounding of friction is too coarse.
 
     Rounding errors are random only if the standard deviation of the noise exceeds 0.4 times the
@@ -171,24 +177,26 @@ def is_rounding_too_coarse(solution: FitSolution) -> bool:
         True if rounding errors are not random.
     """
     variance = (
-        solution.noise_sd * float(solution.noise_model.noise_level_standard_deviations.min())
-    ) ** 2 - solution.friction_rounding_quantum**2 / 12.0
-    return variance < (_MIN_FRICTION_NOISE_PER_QUANTUM * solution.friction_rounding_quantum) ** 2
+        fit_solution.noise_sd * float(fit_solution.noise_model.relative_noise_levels.min())
+    ) ** 2 - fit_solution.friction_rounding_quantum**2 / 12.0
+    return (
+        variance < (_MIN_FRICTION_NOISE_PER_QUANTUM * fit_solution.friction_rounding_quantum) ** 2
+    )
 
 
-def _check_outlier_count(solution: FitSolution) -> Iterator[str]:
+def _yield_warning_if_outliers_are_many(fit_solution: FitSolution) -> Iterator[str]:
     """Yield a warning message if too many rows of the record are outliers."""
-    count, rows = len(solution.outlier_rows), len(solution.residuals)
+    count, rows = len(fit_solution.outlier_rows), len(fit_solution.residuals)
     if count > _MAX_OUTLIER_FRACTION * rows:
         yield f"{count} of {rows} rows are outliers. Remove them from the record, or check the law"
 
 
-def _check_residuals_are_white(solution: FitSolution) -> Iterator[str]:
+def _yield_warning_if_residuals_correlate(fit_solution: FitSolution) -> Iterator[str]:
     """Yield a warning message if the whitened residuals are autocorrelated."""
-    p_value = ljung_box_p_value(
-        solution.whitened_residuals, solution.noise_model.autoregressive_order
+    p_value = compute_ljung_box_p_value(
+        fit_solution.whitened_residuals, fit_solution.noise_model.autoregressive_order
     )
-    if p_value < SIGNIFICANCE_LEVEL:
+    if p_value < WHITENESS_TEST_SIGNIFICANCE_LEVEL:
         yield (
             f"the whitened residuals are still autocorrelated (p = {p_value:.2g}), so the law, "
             "the trend or the noise model does not describe the record"
@@ -196,7 +204,7 @@ def _check_residuals_are_white(solution: FitSolution) -> Iterator[str]:
 
 
 def describe_load_point_noise(
-    solution: FitSolution, loading: str, displacement_noise_sd: float
+    fit_solution: FitSolution, loading_kind: str, displacement_noise_sd: float
 ) -> str:
     """Return a remark about the noise in the load point displacement.
 
@@ -214,14 +222,19 @@ def describe_load_point_noise(
     str
         Remark, or an empty string if the displacement noise has little effect on the parameters.
     """
-    if loading == "steps":
-        by_loading = solution.coordinate_covariance - solution.stiffness_caused_covariance
-        moved = np.diag(by_loading) > 2.0 * np.diag(solution.noise_caused_covariance)
-        pairs = zip(solution.free_parameters, moved.tolist(), strict=True)
+    if loading_kind == "steps":
+        by_loading = (
+            fit_solution.fit_coordinate_covariance
+            - fit_solution.fit_coordinate_covariance_from_stiffness
+        )
+        moved = np.diag(by_loading) > 2.0 * np.diag(
+            fit_solution.fit_coordinate_covariance_from_noise
+        )
+        pairs = zip(fit_solution.free_parameters, moved.tolist(), strict=True)
         names = ", ".join(n for n, most in pairs if most and strip_window_number(n) != "step_time")
         remedy = (
             ""
-            if "step_time" in solution.free_parameters
+            if "step_time" in fit_solution.free_parameters
             else ". Fitting step_time as well reduces this error"
         )
         text = (
@@ -229,22 +242,23 @@ def describe_load_point_noise(
             f"displacement{remedy}"
         )
         return text if names else ""
-    if "slip_distance" not in solution.free_parameters:
+    if "slip_distance" not in fit_solution.free_parameters:
         return ""
     # A displacement error x changes ln V of a stiff slider by k x/a. The resulting change of the
     # fitted slip distance is of second order in x.
     shift = (
         0.5
         * (
-            solution.parameter_values["stiffness"]
+            fit_solution.parameter_values["stiffness"]
             * displacement_noise_sd
-            / solution.parameter_values["a"]
+            / fit_solution.parameter_values["a"]
         )
         ** 2
     )
     if (
         shift
-        < solution.parameter_stderr("slip_distance") / solution.parameter_values["slip_distance"]
+        < fit_solution.compute_parameter_stderr("slip_distance")
+        / fit_solution.parameter_values["slip_distance"]
     ):
         return ""
     return (
@@ -255,7 +269,7 @@ def describe_load_point_noise(
 
 
 def find_unidentified_parameters(
-    solution: FitSolution, displacement_per_row: float
+    fit_solution: FitSolution, displacement_per_row: float
 ) -> tuple[str, ...]:
     """Return the parameters that the record does not constrain.
 
@@ -277,20 +291,22 @@ def find_unidentified_parameters(
     sparse = [
         n
         for n in SLIP_DISTANCE_PARAMETER_NAMES
-        if solution.parameter_values.get(n, math.inf)
+        if fit_solution.parameter_values.get(n, math.inf)
         < _MIN_ROWS_PER_SLIP_DISTANCE * displacement_per_row
     ]
     return tuple(
-        n for n in solution.free_parameters if n in (*solution.unidentified_parameters, *sparse)
+        n
+        for n in fit_solution.free_parameters
+        if n in (*fit_solution.unidentified_parameters, *sparse)
     )
 
 
 def describe_unidentified_parameters(
-    solution: FitSolution,
+    fit_solution: FitSolution,
     parameter_names: tuple[str, ...],
     displacement_per_row: float,
     *,
-    is_a_at_bound: bool,
+    direct_effect_is_at_bound: bool,
 ) -> str:
     """Return the message for parameters that the record does not constrain.
 
@@ -311,13 +327,13 @@ def describe_unidentified_parameters(
         Message that lists the parameters and the possible reasons.
     """
     text = f"the record does not constrain {', '.join(parameter_names)}"
-    if sparse := set(parameter_names) - set(solution.unidentified_parameters):
-        rows = min(solution.parameter_values[name] for name in sparse) / displacement_per_row
+    if sparse := set(parameter_names) - set(fit_solution.unidentified_parameters):
+        rows = min(fit_solution.parameter_values[name] for name in sparse) / displacement_per_row
         text += f"; the record has {rows:.1f} rows per slip distance, and "
         text += (
             f"at least {_MIN_ROWS_PER_SLIP_DISTANCE:g} are required. Sample faster after the step"
         )
-    if "a" in parameter_names and is_a_at_bound:
+    if "a" in parameter_names and direct_effect_is_at_bound:
         text += "; friction does not change at the velocity step. "
         text += "Check whether columns (such as time and displacement) are exchanged"
     return text
@@ -348,7 +364,9 @@ def describe_whiteness(p_value: float, noise_order: int, rows: int) -> str:
     True
     """
     verdict = (
-        "are still autocorrelated" if p_value < SIGNIFICANCE_LEVEL else "show no autocorrelation"
+        "are still autocorrelated"
+        if p_value < WHITENESS_TEST_SIGNIFICANCE_LEVEL
+        else "show no autocorrelation"
     )
-    last = min(LAG_COUNT + noise_order, rows // 4)
+    last = min(LAG_COUNT_BEYOND_NOISE_ORDER + noise_order, rows // 4)
     return f"whitened residuals {verdict} up to lag {last} (p = {p_value:.2g})"

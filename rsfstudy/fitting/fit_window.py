@@ -15,12 +15,15 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from rsfstudy.fitting.linear_friction_before_step import find_start_of_linear_friction
-from rsfstudy.fitting.load_point_noise import integrate_displacement, shift_steps_by_their_errors
+from rsfstudy.fitting.load_point_noise import (
+    copy_steps_shifted_by_their_errors,
+    integrate_load_point_velocity,
+)
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.recorded_loading import (
+    build_loading_history,
+    build_stepwise_loading_history,
     find_steps_between,
-    loading_history,
-    stepwise_loading,
 )
 from rsfstudy.fitting.stress_steps import MIN_RELATIVE_NORMAL_STRESS_CHANGE
 from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
@@ -34,10 +37,10 @@ from rsfstudy.status import Status
 #: parameter.
 _WINDOW_START_BEFORE_STEP_FRACTION, _MIN_ROWS_PER_PARAMETER = 0.5, 3
 #: Largest delay of the loading, relative to the time between the start of the window and the step.
-_MAX_LOADING_DELAY_FRACTION = 0.2
+_MAX_LOADING_DELAY_OVER_TIME_BEFORE_STEP = 0.2
 #: A remark is added to the result if the ratio of the actual extent of a window to its requested
 #: extent is less than this value.
-_MIN_INCLUDED_WINDOW_FRACTION = 0.98
+_MIN_WINDOW_FRACTION_WITHOUT_REMARK = 0.98
 #: Allowed values of the option ``loading``.
 LOADING_KINDS = ("steps", "recorded")
 #: Settings for comparing the recorded normal stress with the normal stress of the model. The first
@@ -51,7 +54,7 @@ _RUNNING_MEDIAN_ROWS_OF_STRESS, _STRESS_DEPARTURE_QUANTILE, _MAX_STRESS_DEPARTUR
 )
 #: A step is too small for estimating initial values of a and b if the logarithm of its velocity
 #: ratio is less than this value.
-_MIN_LOG_VELOCITY_RATIO_FOR_GUESS = 0.02
+_MIN_LOG_VELOCITY_RATIO_TO_GUESS_A_AND_B = 0.02
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,9 @@ class FitWindow:
     def record_row_indices(self) -> np.ndarray:
         """Indices of the record rows in the window."""
         time = self.record.time
-        return np.flatnonzero((time >= self._start_time(self.step)) & (time <= self._end_time()))
+        return np.flatnonzero(
+            (time >= self._compute_start_time(self.step)) & (time <= self._compute_end_time())
+        )
 
     @property
     def mean_normal_stress_before_step(self) -> float:
@@ -132,7 +137,7 @@ class FitWindow:
         time, stress = self.record.time, self.record.columns.get("normal_stress")
         if stress is None:
             return math.nan
-        first, last = np.searchsorted(time, (self._start_time(self.step), self.step.start))
+        first, last = np.searchsorted(time, (self._compute_start_time(self.step), self.step.start))
         return float(stress[min(first, len(time) - 1) : max(first + 1, last)].mean())
 
     @property
@@ -172,7 +177,7 @@ class FitWindow:
             return scene
         return scene.with_(stiffness=machine_stiffness / self.mean_normal_stress_before_step)
 
-    def _end_time(self) -> float:
+    def _compute_end_time(self) -> float:
         """Return the time in s at which the window ends."""
         record, step = self.record, self.step
         # The window of a hold includes the sliding after the hold.
@@ -183,7 +188,7 @@ class FitWindow:
         ]
         last = later[0].start if later else record.time[-1]
         if later and record.loading_steps.index(later[0]) + 1 in self.other_fitted_step_numbers:
-            last = record.time[record.time < self._start_time(later[0])][-1]
+            last = record.time[record.time < self._compute_start_time(later[0])][-1]
         moved = record.columns["displacement"]
         at = np.interp(step.start, record.time, moved)
 
@@ -204,10 +209,10 @@ class FitWindow:
             )
         return float(last)
 
-    def _start_time(self, step: LoadingStep) -> float:
+    def _compute_start_time(self, step: LoadingStep) -> float:
         """Return the time in s at which the window of a step begins."""
         return _find_start_of_linear_friction(
-            self.record, self._earliest_start_time(step), step.start
+            self.record, self._compute_earliest_start_time(step), step.start
         )
 
     @property
@@ -215,20 +220,25 @@ class FitWindow:
         """Remarks about requested rows that the window does not include."""
         record, step, moved = self.record, self.step, self.record.columns["displacement"]
         nominal, begins, at, ends = np.interp(
-            [self._earliest_start_time(step), self._start_time(step), step.start, self._end_time()],
+            [
+                self._compute_earliest_start_time(step),
+                self._compute_start_time(step),
+                step.start,
+                self._compute_end_time(),
+            ],
             record.time,
             moved,
         )
         found, later = (
             [],
-            "next step" if self._end_time() < record.time[-1] else "end of the record",
+            "next step" if self._compute_end_time() < record.time[-1] else "end of the record",
         )
         if begins > nominal:
             found.append(
                 f"the window begins {at - begins:.4g} um before the step instead of "
                 f"{at - nominal:.4g} um, because the earlier friction is not a straight line"
             )
-        elif at - begins < _MIN_INCLUDED_WINDOW_FRACTION * self.displacement_before:
+        elif at - begins < _MIN_WINDOW_FRACTION_WITHOUT_REMARK * self.displacement_before:
             found.append(
                 f"before= is reduced from {self.displacement_before:.4g} to {at - begins:.4g} um, "
                 "because the previous step or the beginning of the record is less than twice "
@@ -236,13 +246,13 @@ class FitWindow:
             )
         if (
             self.fraction_of_displacement_after == 1.0
-            and ends - at < _MIN_INCLUDED_WINDOW_FRACTION * self.displacement_after
+            and ends - at < _MIN_WINDOW_FRACTION_WITHOUT_REMARK * self.displacement_after
         ):
             cut = f"after= is reduced from {self.displacement_after:.4g} to {ends - at:.4g} um"
             found.append(f"{cut} because of the {later}")
         return found
 
-    def _earliest_start_time(self, step: LoadingStep) -> float:
+    def _compute_earliest_start_time(self, step: LoadingStep) -> float:
         """Return the earliest time in s at which a window can start.
 
         If friction before the step is not linear, the window begins later than the earliest
@@ -299,7 +309,7 @@ class FitWindow:
         friction = record.columns["friction"][rows]
         if (
             len(rows) < _MIN_ROWS_PER_PARAMETER * len(free_parameters)
-            or not step.start < self._end_time()
+            or not step.start < self._compute_end_time()
         ):
             text = (
                 f"the window contains {len(rows)} rows, which are too few for "
@@ -314,36 +324,40 @@ class FitWindow:
                 "heading: --columns 'friction=HEADING * -1' (columns=)"
             )
             raise MotionStopped(Status.NOT_APPLICABLE, text)
-        begins, ends = self._start_time(step), self._end_time()
-        pieces = loading_history(record, begins, ends, use_recorded_rows=loading_kind == "recorded")
+        begins, ends = self._compute_start_time(step), self._compute_end_time()
+        pieces = build_loading_history(
+            record, begins, ends, use_recorded_rows=loading_kind == "recorded"
+        )
         if scene.parts.normal_stress.name == "constant":
             # If the normal stress of the scene is constant, variations of the recorded normal
             # stress are noise.
             pieces[:, 2:] = 1.0, 0.0
         moves = (
-            self._build_loadings_with_step_errors(begins, ends) if loading_kind == "steps" else []
+            self._build_loadings_with_shifted_steps(begins, ends) if loading_kind == "steps" else []
         )
         if "step_time" in free_parameters:
             for each in (pieces, *moves):
-                each[0, 0] -= _MAX_LOADING_DELAY_FRACTION * (step.start - begins)
+                each[0, 0] -= _MAX_LOADING_DELAY_OVER_TIME_BEFORE_STEP * (step.start - begins)
         if not pieces[0, 1] > 0.0:
             text = "the window begins in a hold, but a fit must begin with steady sliding"
             raise MotionStopped(Status.NOT_APPLICABLE, text)
         self._check_normal_stress_matches_loading(rows, pieces)
-        steady = stepwise_loading(begins, find_steps_between(record, begins, ends))
-        moved = integrate_displacement(steady, time, step.start)
+        steady = build_stepwise_loading_history(begins, find_steps_between(record, begins, ends))
+        moved = integrate_load_point_velocity(steady, time, step.start)
         return WindowModel(scene, time, moved, friction, pieces, integrator, moves)
 
-    def _build_loadings_with_step_errors(
+    def _build_loadings_with_shifted_steps(
         self, start_time: float, end_time: float
     ) -> list[np.ndarray]:
         """Return loading histories with shifted step times and velocities."""
         steps = find_steps_between(self.record, start_time, end_time)
         others = [step for step in steps if not step.changes_velocity]
-        moved = shift_steps_by_their_errors(
+        moved = copy_steps_shifted_by_their_errors(
             self.record, [step for step in steps if step.changes_velocity]
         )
-        return [stepwise_loading(start_time, sorted([*each, *others])) for each in moved]
+        return [
+            build_stepwise_loading_history(start_time, sorted([*each, *others])) for each in moved
+        ]
 
     def _check_normal_stress_matches_loading(
         self, rows: np.ndarray, loading_segments: np.ndarray
@@ -392,7 +406,7 @@ def _find_start_of_linear_friction(record: Record, start_time: float, end_time: 
     )
 
 
-def compute_stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]:
+def compute_stiffness_ratios_to_first_window(windows: Sequence[FitWindow]) -> tuple[float, ...]:
     """Compute the ratio of stiffness to normal stress in each window.
 
     The machine stiffness is the same in all windows, so the ratio of stiffness to normal stress
@@ -415,8 +429,8 @@ def compute_stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]
     return tuple((stresses[0] / stresses).tolist()) if known else ()
 
 
-def guess_parameters(
-    model: WindowModel,
+def guess_initial_parameter_values(
+    window_model: WindowModel,
     step: LoadingStep,
     free_parameters: Sequence[str],
     slip_distance_guesses: tuple[float, float],
@@ -450,8 +464,11 @@ def guess_parameters(
 
     .. math:: a = (\mu_p - \mu_0)/\ln r, \qquad b = (\mu_p - \mu_1)/\ln r.
     """
-    scene, friction = model.scene, model.friction
-    before, later = friction[model.time < step.start], friction[model.time >= step.end]
+    scene, friction = window_model.scene, window_model.recorded_friction
+    before, later = (
+        friction[window_model.time < step.start],
+        friction[window_model.time >= step.end],
+    )
     values = scene_to_parameters(scene, *slip_distance_guesses)
     if "mu_star" in free_parameters and len(before):
         values["mu_star"] = float(np.mean(before))
@@ -459,7 +476,7 @@ def guess_parameters(
         ratio = math.log(step.velocity_after / step.velocity_before)
     else:
         ratio = 0.0
-    if abs(ratio) > _MIN_LOG_VELOCITY_RATIO_FOR_GUESS:
+    if abs(ratio) > _MIN_LOG_VELOCITY_RATIO_TO_GUESS_A_AND_B:
         peak = later.max() if ratio > 0.0 else later.min()
         read_a = max((peak - values["mu_star"]) / ratio, 1e-3)
         read_b = (peak - float(np.mean(later[-max(len(later) // 10, 1) :]))) / ratio

@@ -14,12 +14,12 @@ from rsfstudy.fitting.velocity_steps import LoadingStep
 
 #: The window of steady sliding before a step begins at this fraction of the time between the
 #: previous step and the step.
-_WINDOW_START_FRACTION = 0.5
+_STEADY_WINDOW_START_OVER_STEP_INTERVAL = 0.5
 #: Largest and smallest number of rows of a window.
 _MAX_ROWS, MIN_ROWS = 4000, 12
 
 
-def select_steady_rows(
+def select_steady_rows_before_step(
     time: np.ndarray, friction: np.ndarray, start_time: float, end_time: float
 ) -> np.ndarray:
     """Select the rows before a step in which friction is a linear function of time.
@@ -39,7 +39,7 @@ def select_steady_rows(
     ndarray of int
         Indices of the rows. The array is empty if there are too few rows.
     """
-    share = _WINDOW_START_FRACTION if start_time > time[0] else 0.0
+    share = _STEADY_WINDOW_START_OVER_STEP_INTERVAL if start_time > time[0] else 0.0
     start_time += share * (end_time - start_time)
     rows = np.flatnonzero((time >= start_time) & (time < end_time))
     if len(rows) < MIN_ROWS:
@@ -49,7 +49,7 @@ def select_steady_rows(
     return rows if len(rows) >= MIN_ROWS else rows[:0]
 
 
-def fit_trend(
+def fit_friction_trend(
     time: np.ndarray, friction: np.ndarray, steps: Sequence[LoadingStep]
 ) -> tuple[float, float]:
     """Fit the common trend of friction in all intervals of steady sliding.
@@ -71,11 +71,11 @@ def fit_trend(
     """
     found = []
     for start_time, end_time, velocity in _iterate_sliding_intervals(time, steps):
-        rows = select_steady_rows(time, friction, start_time, end_time)
+        rows = select_steady_rows_before_step(time, friction, start_time, end_time)
         if len(rows):
             moved = polynomial.polyvander(velocity * (time[rows] - end_time), 1)
-            line = fit_linear_model(time[rows], friction[rows], moved, quick=True)
-            found.append((line.coefficients[1], math.sqrt(line.covariance[1, 1])))
+            line = fit_linear_model(time[rows], friction[rows], moved, noise_by_moments=True)
+            found.append((line.coefficients[1], math.sqrt(line.coefficient_covariance[1, 1])))
     return compute_weighted_mean(*np.array(found).T) if found else (0.0, 0.0)
 
 

@@ -32,7 +32,7 @@ HOLD_QUANTITIES = (
     Quantity("peak_displacement", "", "um", "load point displacement from reloading to the peak"),
 )
 #: Number of quantities in the table that have no error estimate.
-_EXACT_QUANTITY_COUNT = 4
+_COUNT_OF_QUANTITIES_WITHOUT_UNCERTAINTY = 4
 
 
 def build_hold_table(
@@ -77,7 +77,7 @@ def build_hold_table(
     data: dict[str, Any] = {
         q.name: ("hold", numbers[:, n], q.attributes) for n, q in enumerate(HOLD_QUANTITIES)
     }
-    for n, about in enumerate(HOLD_QUANTITIES[_EXACT_QUANTITY_COUNT:]):
+    for n, about in enumerate(HOLD_QUANTITIES[_COUNT_OF_QUANTITIES_WITHOUT_UNCERTAINTY:]):
         named = {**about.attributes, "long_name": f"{words} of {about.long_name}"}
         data[f"{about.name}_{error_suffix}"] = "hold", errors[:, n], named
     rate, stderr, intercept = fit_healing_rate(exact_values[:, 1], values[:, 2], healing_covariance)

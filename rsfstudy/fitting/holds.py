@@ -26,14 +26,18 @@ from numpy.polynomial import polynomial
 from scipy.linalg import block_diag
 from scipy.ndimage import median_filter
 
-from rsfstudy.fitting.friction_trend import MIN_ROWS, fit_trend, select_steady_rows
+from rsfstudy.fitting.friction_trend import (
+    MIN_ROWS,
+    fit_friction_trend,
+    select_steady_rows_before_step,
+)
 from rsfstudy.fitting.hold_table import build_hold_table
 from rsfstudy.fitting.local_regression import (
-    LinearFit,
-    choose_polynomial_window,
-    find_polynomial_maximum,
+    GeneralisedLeastSquaresFit,
+    choose_longest_polynomial_window,
+    find_polynomial_maximum_position,
     fit_linear_model,
-    normalise,
+    rescale_to_minus_one_to_one,
 )
 from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
 
@@ -46,17 +50,21 @@ MAX_HOLD_OVER_SLIDING_VELOCITY = 0.01
 _MIN_FALL_AFTER_PEAK_SIGMAS, _RUNNING_MEDIAN_ROWS = 6.0, 5
 #: Half widths in rows of the windows around a peak, and numbers of rows of the windows at the end
 #: of a hold.
-_PEAK_HALF_WIDTHS = tuple(np.unique(np.rint(3.0 * 1.25 ** np.arange(50)).astype(int)).tolist())
-_HOLD_END_ROWS = tuple(np.unique(np.rint(6.0 * 1.4 ** np.arange(40)).astype(int)).tolist())
+_PEAK_WINDOW_HALF_WIDTHS_IN_ROWS = tuple(
+    np.unique(np.rint(3.0 * 1.25 ** np.arange(50)).astype(int)).tolist()
+)
+_HOLD_END_WINDOW_LENGTHS_IN_ROWS = tuple(
+    np.unique(np.rint(6.0 * 1.4 ** np.arange(40)).astype(int)).tolist()
+)
 #: Degrees of polynomials, for the peak and for the end of a hold. In each pair, the first degree is
 #: used to select the window, and the second degree is used to estimate friction.
 _PEAK_DEGREES, _HOLD_END_DEGREES = (2, 4), (1, 2)
 #: Number of iterations in which the window around a peak is centred on the estimated peak.
-_PEAK_CENTRING_PASSES = 4
+_MAX_PEAK_CENTRING_ITERATIONS = 4
 #: The noise is estimated from rows before the hold whose sampling interval differs from the
 #: sampling interval after the hold by at most this factor. If there are too few such rows, the
 #: noise is estimated from the second half of the rows after the hold.
-_MAX_SAMPLING_INTERVAL_RATIO = 2.0
+_MAX_INTERVAL_RATIO_FOR_NOISE_ESTIMATE = 2.0
 
 
 class Hold(NamedTuple):
@@ -74,19 +82,24 @@ class Hold(NamedTuple):
         Time in s of the next step, or of the end of the record.
     """
 
-    rows_before: np.ndarray
-    stop: LoadingStep
-    reload: LoadingStep
-    window_end: float
+    steady_rows_before: np.ndarray
+    stop_step: LoadingStep
+    reload_step: LoadingStep
+    next_step_or_record_end_time: float
 
     @property
-    def exact_quantities(self) -> tuple[float, float, float, float]:
+    def quantities_without_uncertainty(self) -> tuple[float, float, float, float]:
         """Start time and duration of the hold in s, and adjacent velocities in um/s."""
-        duration = self.reload.middle - self.stop.middle
-        return self.stop.middle, duration, self.stop.velocity_before, self.reload.velocity_after
+        duration = self.reload_step.middle - self.stop_step.middle
+        return (
+            self.stop_step.middle,
+            duration,
+            self.stop_step.velocity_before,
+            self.reload_step.velocity_after,
+        )
 
 
-class Estimate(NamedTuple):
+class HoldQuantityEstimate(NamedTuple):
     """Estimate of a quantity from the coefficients of a linear model.
 
     Parameters
@@ -102,17 +115,17 @@ class Estimate(NamedTuple):
     """
 
     value: float
-    weights: np.ndarray
-    other_variance: float = 0.0
+    coefficient_weights: np.ndarray
+    additional_variance: float = 0.0
     trend_derivative: float = 0.0
 
-    def minus(self, other: Estimate) -> Estimate:
+    def subtract(self, other_estimate: HoldQuantityEstimate) -> HoldQuantityEstimate:
         """Return the difference of two estimates."""
-        return Estimate(
-            self.value - other.value,
-            self.weights - other.weights,
-            self.other_variance + other.other_variance,
-            self.trend_derivative - other.trend_derivative,
+        return HoldQuantityEstimate(
+            self.value - other_estimate.value,
+            self.coefficient_weights - other_estimate.coefficient_weights,
+            self.additional_variance + other_estimate.additional_variance,
+            self.trend_derivative - other_estimate.trend_derivative,
         )
 
 
@@ -137,7 +150,7 @@ def find_holds(time: np.ndarray, friction: np.ndarray, steps: Sequence[LoadingSt
         if not abs(stop.velocity_after) <= MAX_HOLD_OVER_SLIDING_VELOCITY * sliding:
             continue
         first = steps[number - 1].end if number else time[0]
-        rows = select_steady_rows(time, friction, float(first), stop.start)
+        rows = select_steady_rows_before_step(time, friction, float(first), stop.start)
         ends = steps[number + 2].start if number + 2 < len(steps) else time[-1]
         found.append(Hold(rows, stop, reload, float(ends)))
     return found
@@ -165,14 +178,16 @@ def measure_holds(
     """
     moves = [step for step in steps if step.changes_velocity]
     holds = find_holds(time, friction, moves)
-    trend, trend_stderr = fit_trend(time, friction, moves)
+    trend, trend_stderr = fit_friction_trend(time, friction, moves)
     guard = noise_variance(time, displacement) if holds and len(time) > 2 else 0.0
-    results = [HoldFit(time, friction, hold, trend, guard).measure() for hold in holds]
+    results = [
+        HoldFit(time, friction, hold, trend, guard).estimate_hold_quantities() for hold in holds
+    ]
     # The rows are holds, and the columns are the quantities that have errors.
     values, errors, slopes = (np.array([of[n] for of in results]).reshape(-1, 5) for n in range(3))
     by_trend = trend_stderr * slopes
     of_healing = np.diag(errors[:, 2] ** 2) + np.outer(by_trend[:, 2], by_trend[:, 2])
-    exact = np.array([hold.exact_quantities for hold in holds]).reshape(-1, 4)
+    exact = np.array([hold.quantities_without_uncertainty for hold in holds]).reshape(-1, 4)
     table = build_hold_table(exact, values, np.hypot(errors, by_trend), of_healing)
     words = "subtracted trend of friction"
     table["trend"] = (), trend, {"long_name": words, "units": "um-1"}
@@ -205,14 +220,16 @@ class HoldFit:
         displacement_variance: float,
     ) -> None:
         self.time, self.hold, self.displacement_variance = time, hold, displacement_variance
-        late = np.maximum(time - hold.reload.middle, 0.0)
-        early = np.minimum(time - hold.stop.middle, 0.0)
+        late = np.maximum(time - hold.reload_step.middle, 0.0)
+        early = np.minimum(time - hold.stop_step.middle, 0.0)
         #: Load point displacement minus the displacement during the hold.
-        self.moved = hold.stop.velocity_before * early + hold.reload.velocity_after * late
+        self.moved = hold.stop_step.velocity_before * early + hold.reload_step.velocity_after * late
         self.level = friction - trend * self.moved
-        self.rows_after = np.flatnonzero((time > hold.reload.middle) & (time < hold.window_end))
+        self.rows_after = np.flatnonzero(
+            (time > hold.reload_step.middle) & (time < hold.next_step_or_record_end_time)
+        )
 
-    def measure(self) -> tuple[list[float], list[float], list[float]]:
+    def estimate_hold_quantities(self) -> tuple[list[float], list[float], list[float]]:
         """Estimate friction before, during and after the hold, and derived quantities.
 
         Returns
@@ -225,33 +242,48 @@ class HoldFit:
         trend_derivatives : list of float
             Derivatives of the values with respect to the trend.
         """
-        before, time = self.hold.rows_before, self.time
+        before, time = self.hold.steady_rows_before, self.time
         if not len(before):
             return [math.nan] * 5, [math.nan] * 5, [0.0] * 5
         held, (peak, is_adequate) = self._choose_rows_of_hold_end(), self._choose_rows_of_peak()
         parts = [(before, np.ones((len(before), 1)))]
         if len(held):
-            parts.append((held, polynomial.polyvander(self._hold_coordinate(held), 2)))
+            parts.append(
+                (held, polynomial.polyvander(self._compute_normalised_log_hold_time(held), 2))
+            )
         if len(peak):
-            parts.append((peak, polynomial.polyvander(normalise(time[peak]), _PEAK_DEGREES[1])))
+            parts.append(
+                (
+                    peak,
+                    polynomial.polyvander(
+                        rescale_to_minus_one_to_one(time[peak]), _PEAK_DEGREES[1]
+                    ),
+                )
+            )
         rows = np.concatenate([of for of, _columns in parts])
         clock = np.concatenate([time[of] - time[of[0]] for of, _columns in parts])
         columns = block_diag(*(columns for _of, columns in parts))
         found = fit_linear_model(clock, self.level[rows], columns)
-        unknown = Estimate(math.nan, np.zeros(columns.shape[1]), math.nan)
+        unknown = HoldQuantityEstimate(math.nan, np.zeros(columns.shape[1]), math.nan)
         weights = np.eye(columns.shape[1])
-        first = Estimate(
+        first = HoldQuantityEstimate(
             float(found.coefficients[0]), weights[0], 0.0, -float(self.moved[before].mean())
         )
         end = unknown
         if len(held):  # The coordinate of the end of the hold is 1.
             weights_of_end = weights[1 : 2 + _HOLD_END_DEGREES[1]].sum(axis=0)
-            end = Estimate(float(weights_of_end @ found.coefficients), weights_of_end)
+            end = HoldQuantityEstimate(float(weights_of_end @ found.coefficients), weights_of_end)
         top, distance = unknown, unknown
         if len(peak):
-            top, distance = self._estimate_peak(found, peak, is_adequate) or (unknown, unknown)
-        estimates = first, top, top.minus(first), end.minus(first), distance
-        variances = (e.weights @ found.covariance @ e.weights + e.other_variance for e in estimates)
+            top, distance = self._estimate_peak_friction_and_displacement(
+                found, peak, is_adequate
+            ) or (unknown, unknown)
+        estimates = first, top, top.subtract(first), end.subtract(first), distance
+        variances = (
+            e.coefficient_weights @ found.coefficient_covariance @ e.coefficient_weights
+            + e.additional_variance
+            for e in estimates
+        )
         return (
             [estimate.value for estimate in estimates],
             [math.sqrt(variance) for variance in variances],
@@ -259,25 +291,27 @@ class HoldFit:
         )
 
     @cached_property
-    def _reference(self) -> LinearFit:
+    def _noise_reference_fit(self) -> GeneralisedLeastSquaresFit:
         """Fit to rows without a friction peak, whose noise is used to select windows."""
-        rows, after = self.hold.rows_before, self.rows_after
+        rows, after = self.hold.steady_rows_before, self.rows_after
         if len(after) > 1:
             gaps = np.gradient(self.time)
             ratio = gaps[rows] / float(np.median(gaps[after]))
-            alike = np.abs(np.log(ratio)) < math.log(_MAX_SAMPLING_INTERVAL_RATIO)
+            alike = np.abs(np.log(ratio)) < math.log(_MAX_INTERVAL_RATIO_FOR_NOISE_ESTIMATE)
             if alike.sum() >= MIN_ROWS:
                 rows = rows[alike]
             elif len(after) >= 2 * MIN_ROWS:
                 rows = after[len(after) // 2 :]
-        u = normalise(self.time[rows])
-        return fit_linear_model(self.time[rows], self.level[rows], np.vander(u, 3), quick=True)
+        u = rescale_to_minus_one_to_one(self.time[rows])
+        return fit_linear_model(
+            self.time[rows], self.level[rows], np.vander(u, 3), noise_by_moments=True
+        )
 
-    def _hold_coordinate(self, rows: np.ndarray) -> np.ndarray:
+    def _compute_normalised_log_hold_time(self, rows: np.ndarray) -> np.ndarray:
         """Return the logarithm of hold time, scaled to 1 at the end of the hold."""
-        times = np.append(self.time[rows], self.hold.reload.middle)
-        logs = np.log(times - self.hold.stop.middle)
-        return normalise(logs)[:-1]
+        times = np.append(self.time[rows], self.hold.reload_step.middle)
+        logs = np.log(times - self.hold.stop_step.middle)
+        return rescale_to_minus_one_to_one(logs)[:-1]
 
     def _choose_rows_of_hold_end(self) -> np.ndarray:
         """Return the rows of the window at the end of the hold.
@@ -285,18 +319,22 @@ class HoldFit:
         Rows close to the start or the end of the hold are excluded, because the step times have
         errors.
         """
-        time, begins, ends = self.time, self.hold.stop.end, self.hold.reload.start
+        time, begins, ends = self.time, self.hold.stop_step.end, self.hold.reload_step.start
         rows = np.flatnonzero((time > begins) & (time < ends))
         if len(rows) < 2:
             return rows[:0]
         gap = float(np.median(np.diff(time[rows])))
-        speed = self.hold.reload.velocity_after
+        speed = self.hold.reload_step.velocity_after
         guard = 0.5 * gap + math.cbrt(self.displacement_variance * gap / speed**2)
         rows = rows[(time[rows] > begins + guard) & (time[rows] < ends - guard)]
-        windows = (rows[-count:] for count in _HOLD_END_ROWS if count <= len(rows))
-        logs = np.log(np.maximum(time - self.hold.stop.middle, 1e-300))
+        windows = (
+            rows[-count:] for count in _HOLD_END_WINDOW_LENGTHS_IN_ROWS if count <= len(rows)
+        )
+        logs = np.log(np.maximum(time - self.hold.stop_step.middle, 1e-300))
         degree = _HOLD_END_DEGREES[0]
-        return choose_polynomial_window(windows, logs, self.level, degree, self._reference)[0]
+        return choose_longest_polynomial_window(
+            windows, logs, self.level, degree, self._noise_reference_fit
+        )[0]
 
     def _choose_rows_of_peak(self) -> tuple[np.ndarray, bool]:
         """Return the rows of the window around the peak of friction.
@@ -307,23 +345,27 @@ class HoldFit:
         """
         after, level = self.rows_after, self.level
         chosen, is_adequate = after[:0], False
-        if len(after) < 2 * _PEAK_HALF_WIDTHS[0] + 1:
+        if len(after) < 2 * _PEAK_WINDOW_HALF_WIDTHS_IN_ROWS[0] + 1:
             return chosen, is_adequate
         smooth = median_filter(level[after], _RUNNING_MEDIAN_ROWS, mode="nearest")
-        sd = max(float(np.std(level[self.hold.rows_before])), self._reference.noise_sd)
+        sd = max(
+            float(np.std(level[self.hold.steady_rows_before])), self._noise_reference_fit.noise_sd
+        )
         fallen = np.maximum.accumulate(smooth) - smooth > _MIN_FALL_AFTER_PEAK_SIGMAS * sd
         if not fallen.any():
             return chosen, is_adequate
         centre = int(np.argmax(smooth[: int(np.argmax(fallen))]))
-        for _ in range(_PEAK_CENTRING_PASSES):
+        for _ in range(_MAX_PEAK_CENTRING_ITERATIONS):
             windows = _iterate_peak_windows(after, centre)
-            chosen, is_adequate = choose_polynomial_window(
-                windows, self.time, level, _PEAK_DEGREES[0], self._reference
+            chosen, is_adequate = choose_longest_polynomial_window(
+                windows, self.time, level, _PEAK_DEGREES[0], self._noise_reference_fit
             )
             if not len(chosen):
                 break
-            u = normalise(self.time[chosen])
-            at = find_polynomial_maximum(polynomial.polyfit(u, level[chosen], _PEAK_DEGREES[0]))
+            u = rescale_to_minus_one_to_one(self.time[chosen])
+            at = find_polynomial_maximum_position(
+                polynomial.polyfit(u, level[chosen], _PEAK_DEGREES[0])
+            )
             if not math.isfinite(at):
                 break
             before, centre = centre, int(np.argmin(np.abs(u - at)) + chosen[0] - after[0])
@@ -331,16 +373,19 @@ class HoldFit:
                 break
         return chosen, is_adequate
 
-    def _estimate_peak(
-        self, found: LinearFit, rows: np.ndarray, is_adequate: bool
-    ) -> tuple[Estimate, Estimate] | None:
+    def _estimate_peak_friction_and_displacement(
+        self, linear_fit: GeneralisedLeastSquaresFit, rows: np.ndarray, parabola_is_adequate: bool
+    ) -> tuple[HoldQuantityEstimate, HoldQuantityEstimate] | None:
         """Estimate the peak friction and the peak displacement.
 
         The result is None if the polynomial has no maximum.
         """
-        first = len(found.coefficients) - _PEAK_DEGREES[1] - 1
-        coefficients, covariance = found.coefficients[first:], found.covariance[first:, first:]
-        at = find_polynomial_maximum(coefficients)
+        first = len(linear_fit.coefficients) - _PEAK_DEGREES[1] - 1
+        coefficients, covariance = (
+            linear_fit.coefficients[first:],
+            linear_fit.coefficient_covariance[first:, first:],
+        )
+        at = find_polynomial_maximum_position(coefficients)
         if not math.isfinite(at):
             return None
         powers = np.arange(_PEAK_DEGREES[1] + 1)
@@ -351,27 +396,27 @@ class HoldFit:
         # Because of the error of its position, the maximum is too high by this difference.
         excess = 0.5 * float(of_slope @ covariance @ of_slope) / curvature
         misfit = 0.0
-        if not is_adequate:
-            u = normalise(self.time[rows])
+        if not parabola_is_adequate:
+            u = rescale_to_minus_one_to_one(self.time[rows])
             fewer = polynomial.polyfit(u, self.level[rows], _PEAK_DEGREES[0])
-            low = find_polynomial_maximum(fewer)
+            low = find_polynomial_maximum_position(fewer)
             misfit = float(polynomial.polyval(low if math.isfinite(low) else at, fewer)) - value
         half = 0.5 * float(self.time[rows[-1]] - self.time[rows[0]])
-        speed, when = self.hold.reload.velocity_after, self.time[rows[0]] + (at + 1.0) * half
-        distance = speed * float(when - self.hold.reload.middle)
+        speed, when = self.hold.reload_step.velocity_after, self.time[rows[0]] + (at + 1.0) * half
+        distance = speed * float(when - self.hold.reload_step.middle)
         padding = np.zeros(first)
         by_slope = speed * half * of_slope / curvature
         return (
-            Estimate(
+            HoldQuantityEstimate(
                 value - excess, np.append(padding, of_value), excess**2 + misfit**2, -distance
             ),
-            Estimate(distance, np.append(padding, by_slope)),
+            HoldQuantityEstimate(distance, np.append(padding, by_slope)),
         )
 
 
-def _iterate_peak_windows(rows: np.ndarray, centre: int) -> Iterator[np.ndarray]:
+def _iterate_peak_windows(rows: np.ndarray, centre_index: int) -> Iterator[np.ndarray]:
     """Iterate over windows around a centre row, from the shortest to the longest."""
-    for half in _PEAK_HALF_WIDTHS:
-        if centre < half or centre + half >= len(rows):
+    for half in _PEAK_WINDOW_HALF_WIDTHS_IN_ROWS:
+        if centre_index < half or centre_index + half >= len(rows):
             return
-        yield rows[centre - half : centre + half + 1]
+        yield rows[centre_index - half : centre_index + half + 1]

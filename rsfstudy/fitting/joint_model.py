@@ -19,10 +19,10 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.filters import LOW_PASS_ORDERS
 from rsfstudy.fitting.window_model import (
     ACCURATE_DIFFERENCE_SCHEME,
-    DifferenceScheme,
+    FiniteDifferenceScheme,
     ParameterValues,
     WindowModel,
-    parameters_to_fields,
+    fit_parameters_to_scene_fields,
     scene_to_parameters,
 )
 from rsfstudy.motion import MotionStopped
@@ -50,7 +50,9 @@ def is_per_window_parameter(parameter_name: str) -> bool:
     return parameter_name.startswith(_PER_WINDOW_PARAMETER_PREFIXES)
 
 
-def add_window_numbers(parameter_names: Sequence[str], window_count: int) -> tuple[str, ...]:
+def add_window_numbers_to_parameter_names(
+    parameter_names: Sequence[str], window_count: int
+) -> tuple[str, ...]:
     """Return the names of the parameters of a joint fit.
 
     Parameters
@@ -124,7 +126,9 @@ def strip_window_number(name: str) -> str:
     return split_window_number(name)[0]
 
 
-def select_values_of_window(values: Mapping[str, ValueType], number: int) -> dict[str, ValueType]:
+def select_values_of_window(
+    values_by_parameter_name: Mapping[str, ValueType], window_number: int
+) -> dict[str, ValueType]:
     """Select the values of the parameters of a window.
 
     Parameters
@@ -146,8 +150,12 @@ def select_values_of_window(values: Mapping[str, ValueType], number: int) -> dic
     >>> select_values_of_window({"a": 0.01, "mu_star_1": 0.6, "mu_star_2": 0.62}, 2)
     {'a': 0.01, 'mu_star': 0.62}
     """
-    names = {name: split_window_number(name) for name in values}
-    return {own: values[name] for name, (own, of) in names.items() if of in (0, number)}
+    names = {name: split_window_number(name) for name in values_by_parameter_name}
+    return {
+        own: values_by_parameter_name[name]
+        for name, (own, of) in names.items()
+        if of in (0, window_number)
+    }
 
 
 @dataclass(frozen=True)
@@ -165,34 +173,34 @@ class JointModel:
         window. By default, all factors are 1.
     """
 
-    models: tuple[WindowModel, ...]
-    stiffness_factors: tuple[float, ...] = ()
+    window_models: tuple[WindowModel, ...]
+    stiffness_ratios_to_first_window: tuple[float, ...] = ()
 
     @cached_property
-    def time(self) -> np.ndarray:
+    def time_since_first_row_of_window(self) -> np.ndarray:
         """Times of all rows in s, measured from the first row of each window."""
-        return np.concatenate([part.time - part.time[0] for part in self.models])
+        return np.concatenate([part.time - part.time[0] for part in self.window_models])
 
     @cached_property
-    def friction(self) -> np.ndarray:
+    def recorded_friction(self) -> np.ndarray:
         """Recorded friction of all rows, as a single array."""
-        return np.concatenate([part.friction for part in self.models])
+        return np.concatenate([part.recorded_friction for part in self.window_models])
 
     @property
     def averaging_time(self) -> float:
         """Averaging time of friction in s, or 0 if there is no averaging."""
-        passed = self.models[0].filter
+        passed = self.window_models[0].friction_filter
         return passed.size if passed is not None and passed.kind not in LOW_PASS_ORDERS else 0.0
 
     @property
-    def friction_per_window(self) -> list[np.ndarray]:
+    def recorded_friction_per_window(self) -> list[np.ndarray]:
         """Recorded friction of the rows, as one array per window."""
-        return [part.friction for part in self.models]
+        return [part.recorded_friction for part in self.window_models]
 
     @cached_property
-    def displacement(self) -> np.ndarray:
+    def load_point_displacement(self) -> np.ndarray:
         """Load point displacements of all rows in um, measured from the step."""
-        return np.concatenate([part.displacement for part in self.models])
+        return np.concatenate([part.load_point_displacement for part in self.window_models])
 
     def is_linear_in_parameter(self, parameter_name: str) -> bool:
         """Return True if friction is a linear function of a parameter.
@@ -211,10 +219,11 @@ class JointModel:
             True if friction is linear in all windows.
         """
         return all(
-            part.is_linear_in_parameter(strip_window_number(parameter_name)) for part in self.models
+            part.is_linear_in_parameter(strip_window_number(parameter_name))
+            for part in self.window_models
         )
 
-    def max_loading_delay(self, parameter_name: str) -> float:
+    def find_longest_allowed_loading_delay(self, step_time_name: str) -> float:
         """Return the largest loading delay that the model supports.
 
         Parameters
@@ -227,9 +236,11 @@ class JointModel:
         float
             Largest delay of the loading in s, in the window whose step time has this name.
         """
-        return self.models[max(split_window_number(parameter_name)[1] - 1, 0)].max_loading_delay
+        return self.window_models[
+            max(split_window_number(step_time_name)[1] - 1, 0)
+        ].longest_allowed_loading_delay
 
-    def check_parameters(self, values: ParameterValues) -> None:
+    def check_parameters_define_valid_scenes(self, parameter_values: ParameterValues) -> None:
         """Raise an error if the parameters do not define a valid scene.
 
         Parameters
@@ -243,15 +254,15 @@ class JointModel:
             If the scene of a window cannot be built from the parameters.
         """
         try:
-            for part, own in self._iterate_windows(values):
+            for part, own in self._iterate_window_models_with_values(parameter_values):
                 part.build_scene(own)
         except InvalidValue as wrong:
             text = f"the first guess of the parameters is invalid: {wrong}"
             raise MotionStopped(Status.NOT_APPLICABLE, text) from wrong
 
-    def model_friction(
+    def compute_model_friction(
         self,
-        values: ParameterValues,
+        parameter_values: ParameterValues,
         *,
         with_refined_tolerances: bool = False,
         require_stable: bool = False,
@@ -280,10 +291,13 @@ class JointModel:
             "require_stable": require_stable,
         }
         return np.concatenate(
-            [part.model_friction(own, **told) for part, own in self._iterate_windows(values)]
+            [
+                part.compute_model_friction(own, **told)
+                for part, own in self._iterate_window_models_with_values(parameter_values)
+            ]
         )
 
-    def compute_friction_trend(self, values: ParameterValues) -> np.ndarray:
+    def compute_friction_trend(self, parameter_values: ParameterValues) -> np.ndarray:
         """Compute the trend at each row of all windows.
 
         Parameters
@@ -297,14 +311,17 @@ class JointModel:
             Trend of each row.
         """
         return np.concatenate(
-            [part.compute_friction_trend(own) for part, own in self._iterate_windows(values)]
+            [
+                part.compute_friction_trend(own)
+                for part, own in self._iterate_window_models_with_values(parameter_values)
+            ]
         )
 
-    def jacobian(
+    def compute_jacobian(
         self,
-        values: ParameterValues,
+        parameter_values: ParameterValues,
         free_parameters: Sequence[str],
-        difference_scheme: DifferenceScheme = ACCURATE_DIFFERENCE_SCHEME,
+        difference_scheme: FiniteDifferenceScheme = ACCURATE_DIFFERENCE_SCHEME,
     ) -> np.ndarray:
         """Compute the derivatives of friction with respect to parameters.
 
@@ -328,14 +345,16 @@ class JointModel:
         """
         blocks = []
         places = {name: place for place, name in enumerate(free_parameters)}
-        for number, (part, own) in enumerate(self._iterate_windows(values), start=1):
+        for number, (part, own) in enumerate(
+            self._iterate_window_models_with_values(parameter_values), start=1
+        ):
             acting = select_values_of_window(places, number)
             block = np.zeros((len(part.time), len(free_parameters)))
-            block[:, [*acting.values()]] = part.jacobian(own, [*acting], difference_scheme)
+            block[:, [*acting.values()]] = part.compute_jacobian(own, [*acting], difference_scheme)
             blocks.append(block)
         return np.concatenate(blocks)
 
-    def compute_loading_error_sensitivity(self, values: ParameterValues) -> np.ndarray:
+    def compute_loading_error_sensitivity(self, parameter_values: ParameterValues) -> np.ndarray:
         """Compute the changes in friction due to errors of the loading.
 
         Parameters
@@ -353,18 +372,20 @@ class JointModel:
             block_diag(
                 *(
                     part.compute_loading_error_sensitivity(own)
-                    for part, own in self._iterate_windows(values)
+                    for part, own in self._iterate_window_models_with_values(parameter_values)
                 )
             )
         )
 
-    def _iterate_windows(
-        self, values: ParameterValues
+    def _iterate_window_models_with_values(
+        self, parameter_values: ParameterValues
     ) -> Iterator[tuple[WindowModel, dict[str, float]]]:
         """Iterate over pairs of a window model and its parameter values."""
-        factors = self.stiffness_factors or (1.0,) * len(self.models)
-        for number, (part, factor) in enumerate(zip(self.models, factors, strict=True), start=1):
-            own = select_values_of_window(values, number)
+        factors = self.stiffness_ratios_to_first_window or (1.0,) * len(self.window_models)
+        for number, (part, factor) in enumerate(
+            zip(self.window_models, factors, strict=True), start=1
+        ):
+            own = select_values_of_window(parameter_values, number)
             yield part, own | {"stiffness": factor * own["stiffness"]}
 
 
@@ -407,4 +428,4 @@ def fitted_fields(
     if stiffness is not None:
         values["stiffness"] = stiffness
     values |= {n: value for n, value in select_values_of_window(found, 1).items() if n in values}
-    return parameters_to_fields(values, velocity)
+    return fit_parameters_to_scene_fields(values, velocity)

@@ -12,7 +12,11 @@ from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums
 #: Limits for the amount of data. The first two values are the largest number of block averages of
 #: friction, and the smallest number of block averages in each of two lines. The third value is the
 #: smallest number of rows to test.
-_MAX_FITTED_ROW_MEANS, _MIN_ROW_MEANS_BESIDE_BREAK, _MIN_ROWS_OF_LINEAR_PORTION = 120, 6, 20
+_MAX_FITTED_BLOCK_AVERAGES, _MIN_BLOCK_AVERAGES_BESIDE_BREAK, _MIN_ROWS_OF_LINEAR_PORTION = (
+    120,
+    6,
+    20,
+)
 #: Smallest decrease in the sum of squared residuals if two lines are fitted instead of one line.
 #: The decrease is divided by the residual variance and by ln n for n block averages. The residual
 #: variance is increased if the residuals are correlated.
@@ -24,9 +28,9 @@ _MIN_SQUARES_REDUCTION_BY_SLOPE_BREAK = 15.0
 _MIN_FRICTION_DEPARTURE_FROM_LINE, _MIN_FRICTION_DEPARTURE_SIGMAS = 4e-4, 4.0
 #: Fraction of the rows before a step from which the noise is estimated. These rows are the rows
 #: closest to the step.
-_FRACTION_OF_ROWS_FOR_NOISE = 0.4
+_FRACTION_OF_ROWS_FOR_NOISE_ESTIMATE = 0.4
 #: Upper bound on the estimated correlation between successive block averages.
-_MAX_CORRELATION_OF_ROW_MEANS = 0.98
+_MAX_CORRELATION_OF_BLOCK_AVERAGES = 0.98
 
 
 def find_start_of_linear_friction(
@@ -61,8 +65,8 @@ def find_start_of_linear_friction(
     kept = find_non_outlier_mask(friction, np.zeros(len(friction)), find_rounding_quantum(friction))
     if kept is not None:
         friction = np.interp(time, time[kept], friction[kept])
-    while len(time) >= max(_MIN_ROWS_OF_LINEAR_PORTION, 4 * _MIN_ROW_MEANS_BESIDE_BREAK):
-        every = max(1, len(time) // _MAX_FITTED_ROW_MEANS)
+    while len(time) >= max(_MIN_ROWS_OF_LINEAR_PORTION, 4 * _MIN_BLOCK_AVERAGES_BESIDE_BREAK):
+        every = max(1, len(time) // _MAX_FITTED_BLOCK_AVERAGES)
         used = len(time) // every * every
         of_means = (of[-used:].reshape(-1, every).mean(axis=1) for of in (time, friction))
         break_at = _find_slope_break(*of_means)
@@ -83,20 +87,26 @@ def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
     """
     count = len(row_times)
     sums = CumulativeLineFitSums(row_times - row_times[0], friction - friction[0], np.ones(count))
-    places = np.arange(_MIN_ROW_MEANS_BESIDE_BREAK, count - _MIN_ROW_MEANS_BESIDE_BREAK + 1)
-    both = sums.line_residual_squares(0, places) + sums.line_residual_squares(places, count)
+    places = np.arange(
+        _MIN_BLOCK_AVERAGES_BESIDE_BREAK, count - _MIN_BLOCK_AVERAGES_BESIDE_BREAK + 1
+    )
+    both = sums.compute_line_residual_squares(0, places) + sums.compute_line_residual_squares(
+        places, count
+    )
     place = int(places[np.argmin(both)])
     time, moved = row_times - row_times[0], friction - friction[0]
     # Curvature in the earlier rows is not noise, so the noise is estimated from the last rows.
-    last = count - max(int(_FRACTION_OF_ROWS_FOR_NOISE * count), _MIN_ROW_MEANS_BESIDE_BREAK)
+    last = count - max(
+        int(_FRACTION_OF_ROWS_FOR_NOISE_ESTIMATE * count), _MIN_BLOCK_AVERAGES_BESIDE_BREAK
+    )
     (x0, v0), (x1, v1) = sums.fit_line(last, count), sums.fit_line(place, count)
     left = (moved - x0 - v0 * time)[last:]
     size = float(np.sqrt(left @ left / (len(left) - 2)))
     rho = float(left[1:] @ left[:-1] / max(left @ left, 1e-300))
     # Subtracting the fitted line reduces the estimated correlation.
     rho += 4.0 * (1.0 + rho) / len(left)
-    rho = min(max(rho, 0.0), _MAX_CORRELATION_OF_ROW_MEANS)
-    gain = float(sums.line_residual_squares(0, count)) - float(both.min())
+    rho = min(max(rho, 0.0), _MAX_CORRELATION_OF_BLOCK_AVERAGES)
+    gain = float(sums.compute_line_residual_squares(0, count)) - float(both.min())
     departs = float(np.abs(moved[:place] - x1 - v1 * time[:place]).max())
     worth = (
         _MIN_SQUARES_REDUCTION_BY_SLOPE_BREAK

@@ -10,7 +10,7 @@ _MAX_ROWS, _TRIAL_TIMES = 400, 40
 #: Two straight lines are fitted to the displacement, and to the displacement plus elastic
 #: shortening. If the second sum of squared residuals is less than this fraction of the first sum,
 #: the displacement is the slip of the fault.
-_MAX_RATIO_OF_SQUARES = 0.1
+_MAX_SQUARES_RATIO_OF_FAULT_SLIP = 0.1
 
 
 def displacement_is_slip(
@@ -54,14 +54,17 @@ def displacement_is_slip(
     time, displacement, shortening = (of[::every] for of in (time, displacement, shortening))
     if len(time) < _TRIAL_TIMES:
         return False
-    alone = _squares_of_two_lines(time, displacement)
-    return _squares_of_two_lines(time, displacement + shortening) < _MAX_RATIO_OF_SQUARES * alone
+    alone = _compute_residual_squares_of_two_lines(time, displacement)
+    return (
+        _compute_residual_squares_of_two_lines(time, displacement + shortening)
+        < _MAX_SQUARES_RATIO_OF_FAULT_SLIP * alone
+    )
 
 
-def _squares_of_two_lines(time: np.ndarray, values: np.ndarray) -> float:
+def _compute_residual_squares_of_two_lines(time: np.ndarray, displacement: np.ndarray) -> float:
     """Return the least sum of squared residuals of two connected straight lines."""
     scaled = (time - time[0]) / (time[-1] - time[0])
-    centred = values - values.mean()
+    centred = displacement - displacement.mean()
 
     def squares(bend: float) -> float:
         lines = np.column_stack([np.ones_like(scaled), scaled, np.maximum(scaled - bend, 0.0)])

@@ -21,17 +21,17 @@ from rsfstudy.fitting.window_model import LOADING_STEP_SHIFT_OVER_STANDARD_ERROR
 
 #: Largest number of block averages from which the noise is estimated. An autoregressive process of
 #: block averages also describes slow fluctuations of the load point around its set point.
-_MAX_ROW_MEANS_FOR_NOISE = 1000
+_MAX_BLOCK_AVERAGES_FOR_NOISE_ESTIMATE = 1000
 #: The noise of the load point displacement is neglected if the ratio of the noise to the total
 #: displacement of the record is less than this value.
-_MIN_NOISE_OVER_DISPLACEMENT = 1e-7
+_MIN_NOISE_OVER_TOTAL_DISPLACEMENT = 1e-7
 #: Rounding errors are not random if the ratio of the noise to the rounding unit of displacement is
 #: less than the first value. The second value is the number of random phases in the simulation of
 #: rounding errors.
 _MIN_DISPLACEMENT_NOISE_PER_QUANTUM, _ROUNDING_PHASE_DRAW_COUNT = 0.4, 200
 
 
-def shift_steps_by_their_errors(
+def copy_steps_shifted_by_their_errors(
     record: Record, steps: Sequence[LoadingStep]
 ) -> list[list[LoadingStep]]:
     """Return copies of the steps with shifted times and velocities.
@@ -73,7 +73,7 @@ def shift_steps_by_their_errors(
     return moved
 
 
-def integrate_displacement(
+def integrate_load_point_velocity(
     loading: np.ndarray, time: np.ndarray, zero_displacement_time: float
 ) -> np.ndarray:
     """Integrate the load point velocity to obtain the displacement.
@@ -134,18 +134,18 @@ def _compute_step_time_and_velocity_errors(
     best = np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0]
     columns[:, -1] -= columns[:, :-1] @ best
     if (
-        not np.std(columns[:, -1]) > _MIN_NOISE_OVER_DISPLACEMENT * np.ptp(x)
+        not np.std(columns[:, -1]) > _MIN_NOISE_OVER_TOTAL_DISPLACEMENT * np.ptp(x)
         or len(t) < 4 * columns.shape[1]
     ):
         return []
     quantum = find_rounding_quantum(record.columns["displacement"])
     if np.std(columns[:, -1]) < _MIN_DISPLACEMENT_NOISE_PER_QUANTUM * quantum:
         exact = columns[:, :-1] @ best + x[0]
-        root = _covariance_root_from_rounding(
+        root = _compute_covariance_root_from_rounding(
             columns[:, :-1], exact, np.searchsorted(at, t), quantum
         )
     else:
-        root = _covariance_root_from_noise(t, columns)
+        root = _compute_covariance_root_from_noise(t, columns)
     # The detected steps differ from the least-squares solution for all rows.
     missed = best[:-1] - np.concatenate([np.zeros(len(at)), velocities[moves]])
     root = np.column_stack([root, missed])
@@ -154,7 +154,9 @@ def _compute_step_time_and_velocity_errors(
     return [*zip(root[: len(at)].T, faster.T, strict=True)]
 
 
-def _covariance_root_from_noise(time: np.ndarray, displacement_columns: np.ndarray) -> np.ndarray:
+def _compute_covariance_root_from_noise(
+    time: np.ndarray, jacobian_and_residual_columns: np.ndarray
+) -> np.ndarray:
     """Compute a square root of the covariance matrix for random noise.
 
     Parameters
@@ -171,11 +173,11 @@ def _covariance_root_from_noise(time: np.ndarray, displacement_columns: np.ndarr
         A matrix :math:`A` such that :math:`A A^T` is the covariance matrix of the times and
         velocities.
     """
-    every = -(-len(time) // _MAX_ROW_MEANS_FOR_NOISE)
-    table = np.column_stack([time, displacement_columns])[: len(time) // every * every]
+    every = -(-len(time) // _MAX_BLOCK_AVERAGES_FOR_NOISE_ESTIMATE)
+    table = np.column_stack([time, jacobian_and_residual_columns])[: len(time) // every * every]
     time, *rest = table.reshape(-1, every, table.shape[1]).mean(axis=1).T
     jacobian, left = np.array(rest[:-1]).T, rest[-1]
-    told = noise.fit_noise(noise.AUTOREGRESSIVE_NOISE_NAME, time, left, jacobian)
+    told = noise.fit_noise_model(noise.AUTOREGRESSIVE_NOISE_NAME, time, left, jacobian)
     white = told.whiten_columns(np.eye(len(time)))
     size = np.linalg.norm(white @ left) / np.sqrt(len(time) - jacobian.shape[1])
     # The steps are ordinary least-squares estimates, so their covariance matrix is J^+ R J^+'
@@ -184,7 +186,7 @@ def _covariance_root_from_noise(time: np.ndarray, displacement_columns: np.ndarr
     return np.asarray(size * np.linalg.qr(acting)[1].T[:-1, :-1])
 
 
-def _covariance_root_from_rounding(
+def _compute_covariance_root_from_rounding(
     jacobian: np.ndarray,
     unrounded_displacement: np.ndarray,
     row_segments: np.ndarray,

@@ -25,8 +25,8 @@ from numpy.polynomial import polynomial
 from rsfstudy.fitting.noise import (
     AUTOREGRESSIVE_NOISE_NAME,
     NoiseModel,
-    fit_noise,
-    guess_noise_by_moments,
+    estimate_noise_model_by_moments,
+    fit_noise_model,
 )
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
 from rsfstudy.fitting.uniform_sampling_runs import SamplingRun
@@ -39,12 +39,12 @@ _NOISE_ESTIMATION_PASSES = 2
 _MAX_SQUARES_REDUCTION_BY_HIGHER_TERMS = 13.8
 #: Number of successive windows that may be rejected by chance. If more windows are rejected in
 #: succession, longer windows are not tested.
-_MAX_REJECTED_WINDOWS = 1
+_MAX_SUCCESSIVE_REJECTED_WINDOWS = 1
 #: Smallest standard deviation of the noise, relative to the range of the values.
-_MIN_NOISE_SD_OVER_RANGE = 1e-9
+_MIN_NOISE_SD_OVER_RANGE_OF_VALUES = 1e-9
 
 
-class LinearFit(NamedTuple):
+class GeneralisedLeastSquaresFit(NamedTuple):
     """Solution of a linear least-squares problem with correlated noise.
 
     Parameters
@@ -60,14 +60,14 @@ class LinearFit(NamedTuple):
     """
 
     coefficients: np.ndarray
-    covariance: np.ndarray
-    noise: NoiseModel
+    coefficient_covariance: np.ndarray
+    noise_model: NoiseModel
     noise_sd: float
 
 
 def fit_linear_model(
-    time: np.ndarray, values: np.ndarray, jacobian: np.ndarray, *, quick: bool = False
-) -> LinearFit:
+    time: np.ndarray, values: np.ndarray, jacobian: np.ndarray, *, noise_by_moments: bool = False
+) -> GeneralisedLeastSquaresFit:
     """Fit a linear model by generalised least squares.
 
     The noise is an autoregressive process, whose coefficients are estimated by restricted maximum
@@ -91,22 +91,24 @@ def fit_linear_model(
     """
     coefficients = np.linalg.lstsq(jacobian, values)[0]
     quantum = find_rounding_quantum(values)
-    least = max(quantum / math.sqrt(12.0), _MIN_NOISE_SD_OVER_RANGE * float(np.ptp(values)), 1e-12)
+    least = max(
+        quantum / math.sqrt(12.0), _MIN_NOISE_SD_OVER_RANGE_OF_VALUES * float(np.ptp(values)), 1e-12
+    )
     for _ in range(_NOISE_ESTIMATION_PASSES):
         curve = jacobian @ coefficients
         kept = find_non_outlier_mask(values - curve, curve, quantum)
         left = values - curve
         noise = (
-            guess_noise_by_moments(AUTOREGRESSIVE_NOISE_NAME, time, left, kept, least)[0]
-            if quick
-            else fit_noise(AUTOREGRESSIVE_NOISE_NAME, time, left, jacobian, kept, least)
+            estimate_noise_model_by_moments(AUTOREGRESSIVE_NOISE_NAME, time, left, kept, least)[0]
+            if noise_by_moments
+            else fit_noise_model(AUTOREGRESSIVE_NOISE_NAME, time, left, jacobian, kept, least)
         )
         whitened = noise.whiten_columns(np.column_stack([jacobian, values]))
         coefficients = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
     left = whitened[:, -1] - whitened[:, :-1] @ coefficients
     noise_sd = max(float(np.linalg.norm(left)) / math.sqrt(len(left) - jacobian.shape[1]), least)
     root = np.linalg.pinv(whitened[:, :-1])
-    return LinearFit(coefficients, noise_sd**2 * root @ root.T, noise, noise_sd)
+    return GeneralisedLeastSquaresFit(coefficients, noise_sd**2 * root @ root.T, noise, noise_sd)
 
 
 def compute_weighted_mean(values: np.ndarray, stderrs: np.ndarray) -> tuple[float, float]:
@@ -140,12 +142,12 @@ def compute_weighted_mean(values: np.ndarray, stderrs: np.ndarray) -> tuple[floa
     return mean, math.sqrt(max(1.0, ratio) / float(weights.sum()))
 
 
-def choose_polynomial_window(
+def choose_longest_polynomial_window(
     windows: Iterable[np.ndarray],
     coordinate: np.ndarray,
     values: np.ndarray,
     degree: int,
-    reference: LinearFit,
+    noise_reference_fit: GeneralisedLeastSquaresFit,
 ) -> tuple[np.ndarray, bool]:
     """Select the longest window that a polynomial describes within the noise.
 
@@ -168,21 +170,23 @@ def choose_polynomial_window(
     is_adequate : bool
         True if the polynomial describes the samples in the selected window.
     """
-    partial = reference.noise.partial_autocorrelations[:1]
+    partial = noise_reference_fit.noise_model.partial_autocorrelations[:1]
     chosen: np.ndarray | None = None
     shortest: np.ndarray | None = None
     rejected = 0
     for rows in windows:
         run = (SamplingRun(0, len(rows), 0, 0, 0),)
-        columns = polynomial.polyvander(normalise(coordinate[rows]), degree + 2)
+        columns = polynomial.polyvander(rescale_to_minus_one_to_one(coordinate[rows]), degree + 2)
         whitened = NoiseModel(run, partial, np.ones(1)).whiten_columns(
             np.column_stack([columns, values[rows] - values[rows].mean()])
         )
-        low, high = (_residual_squares(whitened, degree + more) for more in (0, 2))
-        if low - high > _MAX_SQUARES_REDUCTION_BY_HIGHER_TERMS * reference.noise_sd**2:
+        low, high = (
+            _compute_polynomial_residual_squares(whitened, degree + more) for more in (0, 2)
+        )
+        if low - high > _MAX_SQUARES_REDUCTION_BY_HIGHER_TERMS * noise_reference_fit.noise_sd**2:
             rejected += 1
             shortest = rows if shortest is None else shortest
-            if rejected > _MAX_REJECTED_WINDOWS:
+            if rejected > _MAX_SUCCESSIVE_REJECTED_WINDOWS:
                 break
             continue
         chosen, rejected = rows, 0
@@ -191,7 +195,7 @@ def choose_polynomial_window(
     return (np.zeros(0, dtype=int) if shortest is None else shortest), False
 
 
-def normalise(coordinate: np.ndarray) -> np.ndarray:
+def rescale_to_minus_one_to_one(coordinate: np.ndarray) -> np.ndarray:
     """Map coordinates linearly to the interval from -1 to 1.
 
     Parameters
@@ -207,7 +211,7 @@ def normalise(coordinate: np.ndarray) -> np.ndarray:
     return np.asarray(2.0 * (coordinate - coordinate[0]) / (coordinate[-1] - coordinate[0]) - 1.0)
 
 
-def find_polynomial_maximum(coefficients: np.ndarray) -> float:
+def find_polynomial_maximum_position(coefficients: np.ndarray) -> float:
     """Find the highest local maximum of a polynomial between -1 and 1.
 
     Parameters
@@ -230,8 +234,12 @@ def find_polynomial_maximum(coefficients: np.ndarray) -> float:
     return float(found[np.argmax(values)]) if len(found) else math.nan
 
 
-def _residual_squares(columns: np.ndarray, degree: int) -> float:
+def _compute_polynomial_residual_squares(
+    polynomial_and_sample_columns: np.ndarray, degree: int
+) -> float:
     """Fit the last column by other columns, and return the residual sum of squares."""
-    basis = np.linalg.qr(columns[:, : degree + 1])[0]
-    left = columns[:, -1] - basis @ (basis.T @ columns[:, -1])
+    basis = np.linalg.qr(polynomial_and_sample_columns[:, : degree + 1])[0]
+    left = polynomial_and_sample_columns[:, -1] - basis @ (
+        basis.T @ polynomial_and_sample_columns[:, -1]
+    )
     return float(left @ left)

@@ -43,17 +43,19 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaged_noise_correlation import AveragedNoiseCorrelation
+from rsfstudy.fitting.averaged_noise_correlation import NoiseCorrelationFromAveraging
 from rsfstudy.fitting.uniform_sampling_runs import (
     SamplingRun,
     count_noise_processes,
+    expand_run_field_to_rows,
     find_noise_level_changes,
     find_sampling_runs,
-    repeat_run_field_per_row,
-    split_runs_at_level_changes,
+    split_runs_at_noise_level_changes,
 )
-from rsfstudy.fitting.whiteness_test import LAG_COUNT as LAG_COUNT
-from rsfstudy.fitting.whiteness_test import ljung_box_p_value as ljung_box_p_value
+from rsfstudy.fitting.whiteness_test import (
+    LAG_COUNT_BEYOND_NOISE_ORDER as LAG_COUNT_BEYOND_NOISE_ORDER,
+)
+from rsfstudy.fitting.whiteness_test import compute_ljung_box_p_value as compute_ljung_box_p_value
 
 #: Names of the noise models: white noise, and an autoregressive process with an automatic order.
 WHITE_NOISE_NAME, AUTOREGRESSIVE_NOISE_NAME = "white", "ar"
@@ -72,7 +74,7 @@ _MIN_NOISE_LEVEL_SD_OVER_RESIDUAL_RMS = 1e-3
 _MAX_LOG_NOISE_LEVEL_RATIO = 30.0
 
 
-def check_noise_name(noise_name: str) -> None:
+def check_noise_model_name(noise_model_name: str) -> None:
     """Raise ``InvalidValue`` if the name of a noise model is unknown.
 
     Parameters
@@ -85,7 +87,7 @@ def check_noise_name(noise_name: str) -> None:
     InvalidValue
         If the name is unknown.
     """
-    if noise_name not in (
+    if noise_model_name not in (
         WHITE_NOISE_NAME,
         AUTOREGRESSIVE_NOISE_NAME,
         *(f"ar{order}" for order in range(1, MAX_AUTOREGRESSIVE_ORDER + 1)),
@@ -95,7 +97,7 @@ def check_noise_name(noise_name: str) -> None:
             AUTOREGRESSIVE_NOISE_NAME,
             f"ar1 to ar{MAX_AUTOREGRESSIVE_ORDER}",
         )
-        raise InvalidValue("noise", noise_name, "is unknown", choices=choices)
+        raise InvalidValue("noise", noise_model_name, "is unknown", choices=choices)
 
 
 @dataclass(frozen=True)
@@ -121,16 +123,16 @@ class NoiseModel:
 
     sampling_runs: tuple[SamplingRun, ...]
     partial_autocorrelations: np.ndarray
-    noise_level_standard_deviations: np.ndarray
+    relative_noise_levels: np.ndarray
     non_outlier_mask: np.ndarray | None = None
-    averaging_correlation: AveragedNoiseCorrelation | None = None
+    correlation_from_averaging: NoiseCorrelationFromAveraging | None = None
 
     @property
     def autoregressive_order(self) -> int:
         """Order of the autoregressive processes."""
         return int(self.partial_autocorrelations.shape[1])
 
-    def whiten_columns(self, columns: np.ndarray) -> np.ndarray:
+    def whiten_columns(self, sample_columns: np.ndarray) -> np.ndarray:
         """Remove the noise correlation from the columns of an array.
 
         Each value is replaced by its prediction error, divided by the standard deviation of the
@@ -146,28 +148,28 @@ class NoiseModel:
         ndarray, shape (kept rows, columns)
             Whitened array without the rows of outliers.
         """
-        columns = self.drop_outliers(columns)
-        columns = (
-            columns
-            if self.averaging_correlation is None
-            else self.averaging_correlation.whiten_columns(columns)
+        sample_columns = self.drop_outlier_rows(sample_columns)
+        sample_columns = (
+            sample_columns
+            if self.correlation_from_averaging is None
+            else self.correlation_from_averaging.whiten_columns(sample_columns)
         )
         scaled = (
-            columns
-            / self.noise_level_standard_deviations[
-                repeat_run_field_per_row(self.sampling_runs, "noise_level_index")
+            sample_columns
+            / self.relative_noise_levels[
+                expand_run_field_to_rows(self.sampling_runs, "noise_level_index")
             ][:, None]
         )
-        found = np.empty_like(columns)
+        found = np.empty_like(sample_columns)
         for run in self.sampling_runs:
-            known = min(run.row_count_since_clock_start, self.autoregressive_order)
+            known = min(run.row_count_since_time_restart, self.autoregressive_order)
             part = scaled[run.start_row - known : run.stop_row]
-            found[run.start_row : run.stop_row] = _prediction_errors(
+            found[run.start_row : run.stop_row] = _compute_scaled_prediction_errors(
                 part, *self.prediction_coefficients_and_variances[run.noise_process_index]
             )[known:]
         return found
 
-    def drop_outliers(self, columns: np.ndarray) -> np.ndarray:
+    def drop_outlier_rows(self, sample_columns: np.ndarray) -> np.ndarray:
         """Remove the rows of outliers from an array.
 
         Parameters
@@ -180,7 +182,11 @@ class NoiseModel:
         ndarray, shape (kept rows, ...)
             Array without the rows of outliers.
         """
-        return columns if self.non_outlier_mask is None else columns[self.non_outlier_mask]
+        return (
+            sample_columns
+            if self.non_outlier_mask is None
+            else sample_columns[self.non_outlier_mask]
+        )
 
     @cached_property
     def prediction_coefficients_and_variances(self) -> list[tuple[list[list[float]], list[float]]]:
@@ -188,15 +194,15 @@ class NoiseModel:
 
         The property contains one result of ``_levinson_durbin`` per noise process.
         """
-        return [*map(_levinson_durbin, self.partial_autocorrelations)]
+        return [*map(_run_levinson_durbin_recursion, self.partial_autocorrelations)]
 
     @property
-    def log_determinant(self) -> float:
+    def correlation_log_determinant(self) -> float:
         """Logarithm of the determinant of the correlation matrix R."""
         total = (
             0.0
-            if self.averaging_correlation is None
-            else self.averaging_correlation.log_determinant
+            if self.correlation_from_averaging is None
+            else self.correlation_from_averaging.correlation_log_determinant
         )
         for first, last, number, before, level in self.sampling_runs:
             variances = self.prediction_coefficients_and_variances[number][1]
@@ -207,7 +213,7 @@ class NoiseModel:
             ]
             total += math.fsum(map(math.log, early))
             total += (last - first - len(early)) * math.log(variances[-1])
-            total += 2.0 * (last - first) * math.log(self.noise_level_standard_deviations[level])
+            total += 2.0 * (last - first) * math.log(self.relative_noise_levels[level])
         return total
 
     @property
@@ -223,25 +229,25 @@ class NoiseModel:
         an AR(1) process with correlation :math:`\rho`, the effective sample size is
         :math:`n (1 - \rho)/(1 + \rho)`.
         """
-        power = self._power_at_zero_frequency
+        power = self._zero_frequency_power_over_variance
         lasts = (
             (run.stop_row - run.start_row, run.noise_process_index) for run in self.sampling_runs
         )
         each = (
             1.0
-            if self.averaging_correlation is None
-            else self.averaging_correlation.row_count_per_independent_sample
+            if self.correlation_from_averaging is None
+            else self.correlation_from_averaging.row_count_per_independent_sample
         )
         return sum(max(1.0, rows / max(power[n], 1.0) / each) for rows, n in lasts)
 
     @property
-    def _power_at_zero_frequency(self) -> list[float]:
+    def _zero_frequency_power_over_variance(self) -> list[float]:
         """Spectral power of each noise process at zero frequency, relative to variance."""
         told = ((c[-1], v[-1]) for c, v in self.prediction_coefficients_and_variances)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 
     @property
-    def degrees_of_freedom_of_slow_noise(self) -> float:
+    def low_frequency_noise_degrees_of_freedom(self) -> float:
         """Degrees of freedom of the estimated spectral power at zero frequency.
 
         The power at zero frequency determines the standard errors of slow trends. The degrees of
@@ -250,16 +256,16 @@ class NoiseModel:
         """
         total = 0.0
         rows = np.bincount(
-            repeat_run_field_per_row(self.sampling_runs, "noise_process_index")
+            expand_run_field_to_rows(self.sampling_runs, "noise_process_index")
         ).tolist()
         for count, told, power in zip(
             rows,
             self.prediction_coefficients_and_variances,
-            self._power_at_zero_frequency,
+            self._zero_frequency_power_over_variance,
             strict=True,
         ):
             # The coefficients have the covariance matrix (innovation variance) R^-1/rows.
-            ones = _prediction_errors(np.ones((self.autoregressive_order, 1)), *told)
+            ones = _compute_scaled_prediction_errors(np.ones((self.autoregressive_order, 1)), *told)
             total += count / (1.0 + 2.0 * power * float(np.square(ones).sum()))
         return total
 
@@ -283,8 +289,8 @@ def build_white_noise_model(time: np.ndarray) -> NoiseModel:
     )
 
 
-def fit_noise(
-    noise_name: str,
+def fit_noise_model(
+    noise_model_name: str,
     time: np.ndarray,
     residuals: np.ndarray,
     jacobian: np.ndarray,
@@ -318,11 +324,11 @@ def fit_noise(
         Noise model with one process for each sampling interval, and one noise level for each
         segment of the record.
     """
-    begin, min_noise_sd = guess_noise_by_moments(
-        noise_name, time, residuals, non_outlier_mask, min_noise_sd, averaging_time
+    begin, min_noise_sd = estimate_noise_model_by_moments(
+        noise_model_name, time, residuals, non_outlier_mask, min_noise_sd, averaging_time
     )
     shape, order = begin.partial_autocorrelations.shape, begin.autoregressive_order
-    if not order and len(begin.noise_level_standard_deviations) == 1:
+    if not order and len(begin.relative_noise_levels) == 1:
         return begin
 
     def noise(x: np.ndarray) -> NoiseModel:
@@ -340,14 +346,14 @@ def fit_noise(
             partial,
             np.maximum(sizes, min_noise_sd),
             non_outlier_mask,
-            begin.averaging_correlation,
+            begin.correlation_from_averaging,
         )
 
-    columns = begin.drop_outliers(np.column_stack([jacobian, residuals]))
+    columns = begin.drop_outlier_rows(np.column_stack([jacobian, residuals]))
     columns = (
         columns
-        if begin.averaging_correlation is None
-        else begin.averaging_correlation.whiten_columns(columns)
+        if begin.correlation_from_averaging is None
+        else begin.correlation_from_averaging.whiten_columns(columns)
     )
     products = _LaggedProductSums(begin.sampling_runs, columns, order)
 
@@ -356,7 +362,7 @@ def fit_noise(
 
     x = np.append(
         np.arctanh(begin.partial_autocorrelations.ravel() / _MAX_PARTIAL_AUTOCORRELATION),
-        np.log(begin.noise_level_standard_deviations[1:]),
+        np.log(begin.relative_noise_levels[1:]),
     )
     if not math.isfinite(misfit(x)):  # All residuals are zero.
         return noise(x)
@@ -367,8 +373,8 @@ def fit_noise(
     return noise(found.x if found.fun <= misfit(x) else x)
 
 
-def guess_noise_by_moments(
-    noise_name: str,
+def estimate_noise_model_by_moments(
+    noise_model_name: str,
     time: np.ndarray,
     residuals: np.ndarray,
     non_outlier_mask: np.ndarray | None = None,
@@ -401,7 +407,7 @@ def guess_noise_by_moments(
     """
     if non_outlier_mask is not None:
         time, residuals = time[non_outlier_mask], residuals[non_outlier_mask]
-    overlap = AveragedNoiseCorrelation(time, averaging_time) if averaging_time else None
+    overlap = NoiseCorrelationFromAveraging(time, averaging_time) if averaging_time else None
     if overlap is not None:
         residuals = overlap.whiten_columns(residuals)
     min_noise_sd = max(
@@ -409,16 +415,16 @@ def guess_noise_by_moments(
         _MIN_NOISE_LEVEL_SD_OVER_RESIDUAL_RMS * math.sqrt(float(np.mean(np.square(residuals)))),
         1e-300,
     )
-    found, first = _estimate_noise_by_moments(
-        noise_name, find_sampling_runs(time), residuals, min_noise_sd
+    found, first = _estimate_noise_of_runs_by_moments(
+        noise_model_name, find_sampling_runs(time), residuals, min_noise_sd
     )
     return replace(
         found, non_outlier_mask=non_outlier_mask, averaging_correlation=overlap
     ), min_noise_sd / first
 
 
-def _estimate_noise_by_moments(
-    noise_name: str,
+def _estimate_noise_of_runs_by_moments(
+    noise_model_name: str,
     sampling_runs: tuple[SamplingRun, ...],
     residuals: np.ndarray,
     min_noise_sd: float,
@@ -433,13 +439,13 @@ def _estimate_noise_by_moments(
         First noise level.
     """
     stated, count = (
-        noise_name.removeprefix(AUTOREGRESSIVE_NOISE_NAME),
+        noise_model_name.removeprefix(AUTOREGRESSIVE_NOISE_NAME),
         count_noise_processes(sampling_runs),
     )
     runs, knots, innovations = sampling_runs, list[int](), residuals
     scale = np.ones(len(residuals))
     for _ in range(1 + _MAX_NOISE_LEVEL_REFINEMENT_PASSES):
-        levels = repeat_run_field_per_row(runs, "noise_level_index")
+        levels = expand_run_field_to_rows(runs, "noise_level_index")
         squares = np.bincount(levels, np.square(innovations)) / np.bincount(levels)
         scale = np.maximum(scale * np.sqrt(squares)[levels], min_noise_sd)
         scaled = residuals / scale
@@ -449,12 +455,12 @@ def _estimate_noise_by_moments(
         ]
         order = (
             0
-            if noise_name == WHITE_NOISE_NAME
+            if noise_model_name == WHITE_NOISE_NAME
             else int(stated)
             if stated
             else _select_autoregressive_order(parts)
         )
-        partial = np.array([_burg_coefficients(part, order) for part in parts]).reshape(
+        partial = np.array([_estimate_burg_coefficients(part, order) for part in parts]).reshape(
             count, order
         )
         sizes = scale[np.unique(levels, return_index=True)[1]]
@@ -463,12 +469,12 @@ def _estimate_noise_by_moments(
         before, knots = knots, find_noise_level_changes(innovations * scale, min_noise_sd)
         if knots == before:
             break
-        runs = split_runs_at_level_changes(sampling_runs, knots)
-    first = float(found.noise_level_standard_deviations[0])
+        runs = split_runs_at_noise_level_changes(sampling_runs, knots)
+    first = float(found.relative_noise_levels[0])
     return NoiseModel(
         found.sampling_runs,
         found.partial_autocorrelations,
-        found.noise_level_standard_deviations / first,
+        found.relative_noise_levels / first,
     ), first
 
 
@@ -516,9 +522,9 @@ class _LaggedProductSums:
         #: items are the number of earlier rows, the index of the noise process, and the noise
         #: levels of all rows in the array.
         self.initial_row_blocks: list[tuple[np.ndarray, int, int, np.ndarray]] = []
-        levels = repeat_run_field_per_row(sampling_runs, "noise_level_index")
+        levels = expand_run_field_to_rows(sampling_runs, "noise_level_index")
         for run in sampling_runs:
-            known = min(run.row_count_since_clock_start, autoregressive_order)
+            known = min(run.row_count_since_time_restart, autoregressive_order)
             rows = slice(
                 run.start_row - known, min(run.start_row + autoregressive_order, run.stop_row)
             )
@@ -543,7 +549,7 @@ class _LaggedProductSums:
                     if i > j:
                         sums[j, i] += found.T
 
-    def compute_restricted_likelihood_objective(self, noise: NoiseModel) -> float:
+    def compute_restricted_likelihood_objective(self, noise_model: NoiseModel) -> float:
         """Compute the REML objective function up to a constant.
 
         Parameters
@@ -560,14 +566,14 @@ class _LaggedProductSums:
         for (number, level), sums in zip(
             self.noise_levels_of_processes, self.lagged_product_sums, strict=True
         ):
-            coefficients, variances = noise.prediction_coefficients_and_variances[number]
+            coefficients, variances = noise_model.prediction_coefficients_and_variances[number]
             full = np.append(1.0, -np.array(coefficients[-1]))
-            scale = variances[-1] * noise.noise_level_standard_deviations[level] ** 2
+            scale = variances[-1] * noise_model.relative_noise_levels[level] ** 2
             total += np.einsum("i,j,ijab->ab", full, full, sums) / scale
         for early, known, number, levels in self.initial_row_blocks:
-            scaled = early / noise.noise_level_standard_deviations[levels][:, None]
-            begun = _prediction_errors(
-                scaled, *noise.prediction_coefficients_and_variances[number]
+            scaled = early / noise_model.relative_noise_levels[levels][:, None]
+            begun = _compute_scaled_prediction_errors(
+                scaled, *noise_model.prediction_coefficients_and_variances[number]
             )[known:]
             total += begun.T @ begun
         try:
@@ -576,7 +582,9 @@ class _LaggedProductSums:
             return math.inf
         free = self.row_count - self.parameter_count
         told = 2.0 * math.fsum(map(math.log, triangle[:-1]))
-        return float(2.0 * free * math.log(triangle[-1]) + noise.log_determinant + told)
+        return float(
+            2.0 * free * math.log(triangle[-1]) + noise_model.correlation_log_determinant + told
+        )
 
 
 def _select_autoregressive_order(residual_runs_per_process: Sequence[Sequence[np.ndarray]]) -> int:
@@ -590,12 +598,12 @@ def _select_autoregressive_order(residual_runs_per_process: Sequence[Sequence[np
     criterion = np.zeros(highest + 1)
     for part in residual_runs_per_process:
         samples = sum(map(len, part))
-        left = np.cumsum(np.log1p(-(np.array(_burg_coefficients(part, highest)) ** 2)))
+        left = np.cumsum(np.log1p(-(np.array(_estimate_burg_coefficients(part, highest)) ** 2)))
         criterion[1:] += samples * left + 2.0 * np.arange(1, highest + 1)
     return int(np.argmin(criterion))
 
 
-def _burg_coefficients(residual_runs: Sequence[np.ndarray], order: int) -> list[float]:
+def _estimate_burg_coefficients(residual_runs: Sequence[np.ndarray], order: int) -> list[float]:
     """Estimate partial autocorrelations with the Burg method."""
     forward, backward = [[p - p.mean() for p in residual_runs] for _ in range(2)]
     found = []
@@ -613,7 +621,7 @@ def _burg_coefficients(residual_runs: Sequence[np.ndarray], order: int) -> list[
     return found
 
 
-def _levinson_durbin(
+def _run_levinson_durbin_recursion(
     partial_autocorrelations: Sequence[float] | np.ndarray,
 ) -> tuple[list[list[float]], list[float]]:
     """Compute prediction coefficients with the Levinson-Durbin recursion.
@@ -636,16 +644,20 @@ def _levinson_durbin(
     return coefficients, variances
 
 
-def _prediction_errors(
-    columns: np.ndarray, coefficients: list[list[float]], variances: list[float]
+def _compute_scaled_prediction_errors(
+    sample_columns: np.ndarray, coefficients: list[list[float]], variances: list[float]
 ) -> np.ndarray:
     """Compute prediction errors divided by their standard deviations."""
     full = np.append(1.0, -np.array(coefficients[-1]))
     # The function ``lfilter`` rejects empty arrays.
-    is_plain = len(full) == 1 or not columns.size
-    found = columns.copy() if is_plain else np.asarray(lfilter(full, [1.0], columns, axis=0))
-    for row, told in enumerate(coefficients[: min(len(coefficients) - 1, len(columns))]):
-        found[row] = columns[row] - np.array(told) @ columns[:row][::-1]
+    is_plain = len(full) == 1 or not sample_columns.size
+    found = (
+        sample_columns.copy()
+        if is_plain
+        else np.asarray(lfilter(full, [1.0], sample_columns, axis=0))
+    )
+    for row, told in enumerate(coefficients[: min(len(coefficients) - 1, len(sample_columns))]):
+        found[row] = sample_columns[row] - np.array(told) @ sample_columns[:row][::-1]
         found[row] /= math.sqrt(variances[row])
     found[len(coefficients) - 1 :] /= math.sqrt(variances[-1])
     return found

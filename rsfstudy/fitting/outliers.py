@@ -20,7 +20,7 @@ _STANDARD_DEVIATION_PER_MAD = 1.4826
 _MAX_DEVIATION_OVER_ROUNDING_QUANTUM = 0.02
 
 
-def find_rounding_quantum(values: np.ndarray) -> float:
+def find_rounding_quantum(samples: np.ndarray) -> float:
     """Find the rounding unit of an array of values.
 
     Rounded values are integer multiples of the rounding unit, plus a constant offset.
@@ -35,7 +35,7 @@ def find_rounding_quantum(values: np.ndarray) -> float:
     float
         Rounding unit, or 0 if the values are not rounded.
     """
-    distinct = np.unique(values)
+    distinct = np.unique(samples)
     gaps = np.diff(distinct)
     gaps = gaps[gaps > 1e-12 * max(abs(distinct[0]), abs(distinct[-1]))]
     if not len(gaps):
@@ -75,7 +75,7 @@ def find_non_outlier_mask(
     ndarray of bool, shape (rows,), or None
         Mask that is False for outliers. The result is None if there are no outliers.
     """
-    off = residuals - _median_of_neighbours(residuals)
+    off = residuals - _compute_median_of_neighbours(residuals)
     blocks = np.array_split(np.abs(off), max(len(off) // _ROWS_PER_RESIDUAL_SCALE_BLOCK, 1))
     least = max(
         0.5 * rounding_quantum, 0.1 * _STANDARD_DEVIATION_PER_MAD * float(np.median(np.abs(off)))
@@ -85,7 +85,7 @@ def find_non_outlier_mask(
     # level.
     scale = np.repeat(maximum_filter(scales, 3), [len(block) for block in blocks])
     peaked = maximum_filter(
-        np.abs(model_friction - _median_of_neighbours(model_friction)),
+        np.abs(model_friction - _compute_median_of_neighbours(model_friction)),
         2 * _NEIGHBOURS_PER_SIDE_FOR_MEDIAN + 1,
     )
     found = np.abs(off) > np.maximum(
@@ -94,12 +94,12 @@ def find_non_outlier_mask(
     return ~found if found.any() and scale.min() > 0.0 else None
 
 
-def _median_of_neighbours(values: np.ndarray) -> np.ndarray:
+def _compute_median_of_neighbours(samples: np.ndarray) -> np.ndarray:
     """Compute the median of the neighbours of each row, excluding the row itself."""
     around = np.ones(2 * _NEIGHBOURS_PER_SIDE_FOR_MEDIAN + 1, dtype=bool)
     around[_NEIGHBOURS_PER_SIDE_FOR_MEDIAN] = False
     lower, upper = (
-        rank_filter(values, rank, footprint=around, mode="mirror")
+        rank_filter(samples, rank, footprint=around, mode="mirror")
         for rank in (_NEIGHBOURS_PER_SIDE_FOR_MEDIAN - 1, _NEIGHBOURS_PER_SIDE_FOR_MEDIAN)
     )
     return np.asarray(0.5 * (lower + upper))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 
 #: Largest number of posterior draws.
-_MAX_DRAWS = 1_000_000
+_MAX_POSTERIOR_DRAWS = 1_000_000
 #: Settings of the sampler: the number of steps between two convergence checks, the smallest length
 #: of a chain in autocorrelation times, and the length of the burn-in in autocorrelation times.
 (
@@ -39,7 +39,7 @@ _MAX_DRAWS = 1_000_000
 _PROPOSAL_DEGREES_OF_FREEDOM = 5.0
 
 
-def check_sampling_is_possible(draw_count: int) -> None:
+def check_posterior_sampling_is_possible(draw_count: int) -> None:
     """Raise ``InvalidValue`` if posterior sampling is impossible.
 
     Parameters
@@ -52,9 +52,9 @@ def check_sampling_is_possible(draw_count: int) -> None:
     InvalidValue
         If the number of draws is invalid, or if emcee is not installed.
     """
-    if not isinstance(draw_count, int) or not 0 <= draw_count <= _MAX_DRAWS:
+    if not isinstance(draw_count, int) or not 0 <= draw_count <= _MAX_POSTERIOR_DRAWS:
         raise InvalidValue(
-            "posterior", draw_count, f"must be a whole number from 0 to {_MAX_DRAWS:,}"
+            "posterior", draw_count, f"must be a whole number from 0 to {_MAX_POSTERIOR_DRAWS:,}"
         )
     if draw_count and importlib.util.find_spec("emcee") is None:
         remedy = "pip install 'rsfstudy[posterior]'."
@@ -66,8 +66,8 @@ def check_sampling_is_possible(draw_count: int) -> None:
         )
 
 
-def sample_posterior_coordinates(
-    problem: FitProblem, solution: FitSolution, draw_count: int, seed: int = 0
+def sample_posterior_fit_coordinates(
+    fit_problem: FitProblem, fit_solution: FitSolution, draw_count: int, seed: int = 0
 ) -> tuple[np.ndarray, float]:
     """Sample the posterior distribution of the free parameters.
 
@@ -103,24 +103,28 @@ def sample_posterior_coordinates(
 
     halts: list[MotionStopped] = []
     errors = multivariate_t(
-        problem.values_to_coordinates(solution.parameter_values),
-        solution.coordinate_covariance,
+        fit_problem.parameter_values_to_fit_coordinates(fit_solution.parameter_values),
+        fit_solution.fit_coordinate_covariance,
         _PROPOSAL_DEGREES_OF_FREEDOM,
         allow_singular=True,
     )
 
     def log_likelihood(x: np.ndarray) -> float:
-        if halts or not ((problem.lower_bounds <= x) & (x <= problem.upper_bounds)).all():
+        if halts or not ((fit_problem.lower_bounds <= x) & (x <= fit_problem.upper_bounds)).all():
             return -math.inf
         try:
-            left = problem.residuals(problem.coordinates_to_values(x), require_stable=True)
+            left = fit_problem.compute_residuals(
+                fit_problem.fit_coordinates_to_parameter_values(x), require_stable=True
+            )
         except MotionStopped as halt:
             halts.append(halt)
             return -math.inf
         if not np.isfinite(left).all():
             return -math.inf
         return -0.5 * float(
-            np.square(solution.noise_model.whiten_columns(left[:, None]) / solution.noise_sd).sum()
+            np.square(
+                fit_solution.noise_model.whiten_columns(left[:, None]) / fit_solution.noise_sd
+            ).sum()
         )
 
     def proposed(x: np.ndarray, rng: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
@@ -129,13 +133,14 @@ def sample_posterior_coordinates(
 
     rng = np.random.RandomState(seed)
     moves = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.MHMove(proposed), 0.5)]
-    walkers = 2 * len(solution.free_parameters) + 2
+    walkers = 2 * len(fit_solution.free_parameters) + 2
     sampler = emcee.EnsembleSampler(
-        walkers, len(solution.free_parameters), log_likelihood, moves=moves
+        walkers, len(fit_solution.free_parameters), log_likelihood, moves=moves
     )
     begin = errors.rvs(walkers, rng).reshape(walkers, -1)
     state = emcee.State(
-        np.clip(begin, problem.lower_bounds, problem.upper_bounds), random_state=rng.get_state()
+        np.clip(begin, fit_problem.lower_bounds, fit_problem.upper_bounds),
+        random_state=rng.get_state(),
     )
     while True:
         state = sampler.run_mcmc(state, _CHAIN_STEPS_PER_CONVERGENCE_CHECK)
@@ -153,7 +158,7 @@ def sample_posterior_coordinates(
 
 
 def sample_posterior_parameters(
-    problem: FitProblem, solution: FitSolution, draw_count: int
+    fit_problem: FitProblem, fit_solution: FitSolution, draw_count: int
 ) -> dict[str, Any]:
     """Sample the posterior distribution and return parameter values.
 
@@ -177,9 +182,9 @@ def sample_posterior_parameters(
     MotionStopped
         If the work budget is exhausted before the chain is long enough.
     """
-    drawn, time = np.full((draw_count, len(solution.free_parameters)), math.nan), math.nan
-    if np.isfinite(solution.coordinate_covariance).all():
-        drawn, time = sample_posterior_coordinates(problem, solution, draw_count)
-    logs = [name in LOGARITHMIC_PARAMETERS for name in solution.free_parameters]
+    drawn, time = np.full((draw_count, len(fit_solution.free_parameters)), math.nan), math.nan
+    if np.isfinite(fit_solution.fit_coordinate_covariance).all():
+        drawn, time = sample_posterior_fit_coordinates(fit_problem, fit_solution, draw_count)
+    logs = [name in LOGARITHMIC_PARAMETERS for name in fit_solution.free_parameters]
     drawn[:, logs] = np.exp(drawn[:, logs])
     return {"posterior": drawn, "autocorrelation_time": time}

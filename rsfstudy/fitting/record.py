@@ -20,13 +20,13 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.holds import measure_holds
 from rsfstudy.fitting.stiffness_portions import measure_stiffness
 from rsfstudy.fitting.stress_steps import (
-    find_stress_steps,
-    merge_stress_into_velocity_steps,
-    set_stress_levels,
+    find_normal_stress_steps,
+    merge_normal_stress_and_velocity_steps,
+    set_normal_stresses_of_steps,
 )
 from rsfstudy.fitting.velocity_steps import LoadingStep, detect_velocity_steps
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.quantities import Quantity, is_variable_name
+from rsfstudy.quantities import Quantity, is_valid_variable_name
 
 #: Columns of a record with their symbols, units and meanings. The normal stress is optional.
 RECORD_COLUMNS = (
@@ -37,7 +37,7 @@ RECORD_COLUMNS = (
 )
 
 #: Columns of the table of steps, in the order of the fields of ``LoadingStep``.
-_STEP_COLUMNS = (
+_STEP_TABLE_COLUMNS = (
     Quantity("begins", "$t$", "s", "time at which the step begins"),
     Quantity("ends", "$t$", "s", "time at which the step ends"),
     Quantity("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
@@ -101,7 +101,7 @@ class Record:
 
     def __post_init__(self) -> None:
         """Validate the name and the columns."""
-        if not is_variable_name(self.name):
+        if not is_valid_variable_name(self.name):
             raise InvalidValue("name", self.name, "must be a Python identifier")
         for about in RECORD_COLUMNS[:3]:
             if about.name not in self.columns:
@@ -221,11 +221,11 @@ class Record:
         )
         if stress is None:
             return steps
-        changes = find_stress_steps(self.time, stress)
+        changes = find_normal_stress_steps(self.time, stress)
         if self.specified_steps is None:
             velocity = float(np.polyfit(self.time - self.time[0], moved, 1)[0])
-            steps = merge_stress_into_velocity_steps(steps, changes, velocity)
-        return set_stress_levels(steps, changes, self.time, stress)
+            steps = merge_normal_stress_and_velocity_steps(steps, changes, velocity)
+        return set_normal_stresses_of_steps(steps, changes, self.time, stress)
 
     def steps(self) -> xr.Dataset:
         """Return a table of the steps of velocity and normal stress.
@@ -238,9 +238,9 @@ class Record:
             the normal stress was recorded, the dataset also contains ``normal_stress_before`` and
             ``normal_stress_after`` in Pa.
         """
-        numbers = [step[: len(_STEP_COLUMNS)] for step in self.loading_steps]
-        rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_COLUMNS))
-        shown = _STEP_COLUMNS if "normal_stress" in self.columns else _STEP_COLUMNS[:4]
+        numbers = [step[: len(_STEP_TABLE_COLUMNS)] for step in self.loading_steps]
+        rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_TABLE_COLUMNS))
+        shown = _STEP_TABLE_COLUMNS if "normal_stress" in self.columns else _STEP_TABLE_COLUMNS[:4]
         data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
         number = {"long_name": "number of the step", "units": "1"}
         steps = {"step": ("step", np.arange(1, len(rows) + 1), number)}

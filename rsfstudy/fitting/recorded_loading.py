@@ -20,7 +20,7 @@ from rsfstudy.fitting.velocity_steps import LoadingStep
 _CONSTANT_VELOCITY_SEGMENTS_PER_RAMP = 16
 
 
-def loading_history(
+def build_loading_history(
     record: Record, start_time: float, end_time: float, *, use_recorded_rows: bool
 ) -> np.ndarray:
     """Return the loading history of a record between two times.
@@ -56,13 +56,13 @@ def loading_history(
     if use_recorded_rows:
         part, first = record.window(start_time, end_time), steps[0] if steps else None
         if first is None:
-            return _build_loading_from_rows(part, 0.0, math.nan)
+            return _build_loading_history_from_rows(part, 0.0, math.nan)
         sliding = part.time < first.start
         stress = part.columns.get("normal_stress", np.array([]))[: int(sliding.sum())]
-        return _build_loading_from_rows(
+        return _build_loading_history_from_rows(
             part, first.velocity_before, float(stress.mean()) if stress.size else math.nan
         )
-    return stepwise_loading(start_time, steps)
+    return build_stepwise_loading_history(start_time, steps)
 
 
 def find_steps_between(record: Record, start_time: float, end_time: float) -> list[LoadingStep]:
@@ -85,7 +85,7 @@ def find_steps_between(record: Record, start_time: float, end_time: float) -> li
     ]
 
 
-def stepwise_loading(start_time: float, steps: Sequence[LoadingStep]) -> np.ndarray:
+def build_stepwise_loading_history(start_time: float, steps: Sequence[LoadingStep]) -> np.ndarray:
     """Return a loading history with constant loading between steps.
 
     Parameters
@@ -103,7 +103,7 @@ def stepwise_loading(start_time: float, steps: Sequence[LoadingStep]) -> np.ndar
     pieces, level = [(start_time, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
         lasts, rises = step.end - step.start, level * (step.stress_ratio - 1.0)
-        for part, speed in _velocity_profile(step):
+        for part, speed in _list_velocities_during_step(step):
             at = step.start + part * lasts
             pieces.append((float(at), float(speed), level + part * rises, rises / lasts))
         level += rises
@@ -111,7 +111,7 @@ def stepwise_loading(start_time: float, steps: Sequence[LoadingStep]) -> np.ndar
     return np.array(pieces)
 
 
-def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
+def _list_velocities_during_step(step: LoadingStep) -> list[tuple[float, float]]:
     """Return the load point velocities during a step.
 
     Returns
@@ -139,7 +139,7 @@ def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
     ]
 
 
-def _build_loading_from_rows(
+def _build_loading_history_from_rows(
     record: Record, initial_velocity: float, initial_normal_stress: float
 ) -> np.ndarray:
     """Return a loading history with one segment per row of the record.

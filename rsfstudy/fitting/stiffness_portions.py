@@ -36,12 +36,12 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import least_squares
 
-from rsfstudy.fitting.friction_trend import fit_trend
+from rsfstudy.fitting.friction_trend import fit_friction_trend
 from rsfstudy.fitting.local_regression import compute_weighted_mean
 from rsfstudy.fitting.noise import (
     AUTOREGRESSIVE_NOISE_NAME,
     build_white_noise_model,
-    fit_noise,
+    fit_noise_model,
 )
 from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums, LoadingStep, noise_variance
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
@@ -50,16 +50,16 @@ from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 RELOADING, UNLOADING, INITIAL_LOADING = "reloading", "unloading", "initial loading"
 #: A portion ends where the slope falls below this fraction of its largest value. During unloading,
 #: the fault slips forward at first, and the slope is up to twice the stiffness.
-_MIN_SLOPE_FRACTION = {RELOADING: 0.6, UNLOADING: 0.3, INITIAL_LOADING: 0.6}
+_MIN_SLOPE_OVER_LARGEST_SLOPE_BY_KIND = {RELOADING: 0.6, UNLOADING: 0.3, INITIAL_LOADING: 0.6}
 #: Smallest ratio of a slope to its standard error, and smallest number of rows of a portion.
-_MIN_SLOPE_SIGMAS, _MIN_PORTION_ROWS = 12.0, 10
+_MIN_SLOPE_SIGMAS, _MIN_ROWS_OF_LOCKED_PORTION = 12.0, 10
 #: Slopes are computed in windows. In each window, friction changes by this fraction of the change
 #: in friction in the whole portion.
-_SLOPE_WINDOW_RISE = 0.15
+_WINDOW_FRICTION_CHANGE_OVER_TOTAL = 0.15
 #: Largest number of rows of a portion. The rows of longer portions are thinned.
-_MAX_PORTION_ROWS = 3000
+_MAX_ROWS_OF_LOCKED_PORTION = 3000
 #: Smallest increase in friction during the initial loading.
-_MIN_INITIAL_RISE = 0.05
+_MIN_FRICTION_RISE_OF_INITIAL_LOADING = 0.05
 #: Mean and standard deviation of the prior distributions of ln a and g.
 _PRIOR_OF_LOG_A, _PRIOR_OF_STATE_CHANGE = (math.log(0.01), 0.7), (0.0, 1.5)
 #: Bounds of ln |v|, ln a and g. The slip rate ratio v belongs to the last row of a portion, or to
@@ -79,10 +79,10 @@ _NOISE_ESTIMATION_PASSES = 3
 _ROWS_AFTER_STEP, _MAX_DEVIATION_OF_IMMEDIATE_STEP = 20, 5.0
 #: Largest relative standard error of the stiffness of a portion. Portions with larger errors are
 #: ignored.
-_MAX_RELATIVE_STDERR = 0.25
+_MAX_RELATIVE_STIFFNESS_STDERR = 0.25
 
 
-class Portion(NamedTuple):
+class LockedPortion(NamedTuple):
     """Portion of a record in which the fault is almost locked.
 
     Parameters
@@ -128,13 +128,13 @@ def measure_stiffness(
     else:
         first_velocity = float(np.polyfit(time - time[0], displacement, 1)[0])
     moves.insert(0, LoadingStep(float(time[0]), float(time[0]), 0.0, first_velocity))
-    trend, trend_stderr = fit_trend(time, friction, moves)
+    trend, trend_stderr = fit_friction_trend(time, friction, moves)
     rows: list[tuple[str, float, float, float, float, float]] = []
-    if len(time) < _MIN_PORTION_ROWS:
-        return _build_table(rows, 0.0, has_stress=normal_stress is not None)
-    for portion in find_portions(time, displacement, friction, moves):
+    if len(time) < _MIN_ROWS_OF_LOCKED_PORTION:
+        return _build_stiffness_table(rows, 0.0, has_normal_stress=normal_stress is not None)
+    for portion in find_locked_portions(time, displacement, friction, moves):
         value, stderr = fit_stiffness(portion)
-        if 0.0 < stderr < _MAX_RELATIVE_STDERR * value:
+        if 0.0 < stderr < _MAX_RELATIVE_STIFFNESS_STDERR * value:
             begins, ends = portion.time[[0, -1]].tolist()
             inside = (time >= begins) & (time <= ends)
             stress = math.nan if normal_stress is None else float(normal_stress[inside].mean())
@@ -142,14 +142,14 @@ def measure_stiffness(
     if any(row[0] != INITIAL_LOADING for row in rows):
         rows = [row for row in rows if row[0] != INITIAL_LOADING]
     by_trend = 0.5 * math.hypot(trend, trend_stderr)
-    return _build_table(rows, by_trend, has_stress=normal_stress is not None)
+    return _build_stiffness_table(rows, by_trend, has_normal_stress=normal_stress is not None)
 
 
-def _build_table(
-    rows: Sequence[tuple[str, float, float, float, float, float]],
-    error_by_trend: float,
+def _build_stiffness_table(
+    portion_rows: Sequence[tuple[str, float, float, float, float, float]],
+    trend_caused_error: float,
     *,
-    has_stress: bool,
+    has_normal_stress: bool,
 ) -> xr.Dataset:
     """Build a table of the locked portions and the mean stiffness.
 
@@ -157,9 +157,9 @@ def _build_table(
     portion. ``error_by_trend`` is the error of all stiffnesses due to the trend of friction.
     """
     begins, ends, values, errors, stresses = (
-        np.array([row[1:] for row in rows], dtype=float).reshape(-1, 5).T
+        np.array([row[1:] for row in portion_rows], dtype=float).reshape(-1, 5).T
     )
-    kinds = np.array([row[0] for row in rows], dtype=object)
+    kinds = np.array([row[0] for row in portion_rows], dtype=object)
     number = {"long_name": "number of the portion", "units": "1"}
     table = xr.Dataset(
         {
@@ -175,17 +175,19 @@ def _build_table(
                 {"long_name": "time at the end of the portion", "units": "s"},
             ),
         },
-        {"portion": ("portion", np.arange(1, len(rows) + 1), number)},
+        {"portion": ("portion", np.arange(1, len(portion_rows) + 1), number)},
     )
-    scales = {"stiffness": (np.ones(len(rows)), "um-1", "stiffness divided by normal stress")}
-    if has_stress:
+    scales = {
+        "stiffness": (np.ones(len(portion_rows)), "um-1", "stiffness divided by normal stress")
+    }
+    if has_normal_stress:
         scales["machine_stiffness"] = stresses, "Pa um-1", "stiffness of the machine"
     for name, (scale, units, words) in scales.items():
         each, spread = values * scale, errors * scale
         mean, stderr = math.nan, math.nan
-        if rows:
+        if portion_rows:
             mean, stderr = compute_weighted_mean(each, spread)
-            stderr = math.hypot(stderr, error_by_trend * float(scale.mean()))
+            stderr = math.hypot(stderr, trend_caused_error * float(scale.mean()))
         about = {"long_name": words, "units": units}
         of_error = {"long_name": f"standard error of the {words}", "units": units}
         table[f"portion_{name}"] = "portion", each, about
@@ -194,12 +196,12 @@ def _build_table(
     return copy_with_cf_encoding(table)
 
 
-def find_portions(
+def find_locked_portions(
     time: np.ndarray,
     displacement: np.ndarray,
     friction: np.ndarray,
     steps: Sequence[LoadingStep],
-) -> Iterator[Portion]:
+) -> Iterator[LockedPortion]:
     """Find the portions of a record in which the fault is almost locked.
 
     Parameters
@@ -230,7 +232,9 @@ def find_portions(
         begins = _find_end_of_step(time, displacement, step, noise_sd) if number else step.end
         rows = (time >= begins) & (time < ends)
         moved = step.velocity_after * (time[rows] - step.middle)
-        portion = _cut_at_slip(Portion(kind, time[rows], moved, friction[rows]))
+        portion = _remove_rows_after_slip_onset(
+            LockedPortion(kind, time[rows], moved, friction[rows])
+        )
         if portion is not None:
             yield portion
 
@@ -261,24 +265,27 @@ def _find_end_of_step(
     return (step.middle if is_immediate else step.end) + guard
 
 
-def _cut_at_slip(portion: Portion) -> Portion | None:
+def _remove_rows_after_slip_onset(portion: LockedPortion) -> LockedPortion | None:
     """Remove the rows that were recorded after the fault began to slip.
 
     The result is None if friction does not change considerably at the beginning of the portion.
     """
     count = len(portion.time)
-    if count < _MIN_PORTION_ROWS:
+    if count < _MIN_ROWS_OF_LOCKED_PORTION:
         return None
     x = np.abs(portion.displacement - portion.displacement[0])
     y = portion.friction - portion.friction[0]
     y = -y if portion.kind == UNLOADING else y
     half = max(int(np.argmax(y >= 0.5 * y.max())), 1)
-    width = max(int(np.argmax(y >= _SLOPE_WINDOW_RISE * y.max())), _MIN_PORTION_ROWS // 2)
+    width = max(
+        int(np.argmax(y >= _WINDOW_FRICTION_CHANGE_OVER_TOTAL * y.max())),
+        _MIN_ROWS_OF_LOCKED_PORTION // 2,
+    )
     if count < 2 * width:
         return None
     starts = np.arange(count - width + 1)
     sums = CumulativeLineFitSums(x, y, np.ones(count))
-    _mt, _mx, squares, products, _xx = sums.compute_moments(starts, starts + width)
+    _mt, _mx, squares, products, _xx = sums.compute_weighted_moments(starts, starts + width)
     slopes = products / squares
     # The fault is locked at the beginning, so the steepest slope is sought before friction has
     # changed by half of its change in the whole portion.
@@ -286,18 +293,18 @@ def _cut_at_slip(portion: Portion) -> Portion | None:
     sd = math.sqrt(noise_variance(portion.time, y))
     if not steepest > _MIN_SLOPE_SIGMAS * sd / math.sqrt(float(squares.mean())):
         return None
-    low = slopes < _MIN_SLOPE_FRACTION[portion.kind] * steepest
+    low = slopes < _MIN_SLOPE_OVER_LARGEST_SLOPE_BY_KIND[portion.kind] * steepest
     last = int(np.argmax(low)) + width // 2 if low.any() else count
-    if last < _MIN_PORTION_ROWS or (
-        portion.kind == INITIAL_LOADING and y[last - 1] < _MIN_INITIAL_RISE
+    if last < _MIN_ROWS_OF_LOCKED_PORTION or (
+        portion.kind == INITIAL_LOADING and y[last - 1] < _MIN_FRICTION_RISE_OF_INITIAL_LOADING
     ):
         return None
-    every = -(-last // _MAX_PORTION_ROWS)
+    every = -(-last // _MAX_ROWS_OF_LOCKED_PORTION)
     rows = slice(0, last, every)
-    return Portion(portion.kind, *(of[rows] for of in portion[1:]))
+    return LockedPortion(portion.kind, *(of[rows] for of in portion[1:]))
 
 
-def fit_stiffness(portion: Portion) -> tuple[float, float]:
+def fit_stiffness(portion: LockedPortion) -> tuple[float, float]:
     """Fit the stiffness to a portion of a record.
 
     Parameters
@@ -326,17 +333,19 @@ def fit_stiffness(portion: Portion) -> tuple[float, float]:
     noise, noise_sd = build_white_noise_model(time), math.sqrt(noise_variance(time, y))
 
     def left(parameters: np.ndarray) -> np.ndarray:
-        residuals = y - _friction_while_locked(x, parameters, unloads)
+        residuals = y - _compute_friction_while_locked(x, parameters, unloads)
         whitened = noise.whiten_columns(residuals[:, None])[:, 0] / noise_sd
         return np.append(whitened, (parameters[3:] - prior_means) / prior_sds)
 
     for _ in range(_NOISE_ESTIMATION_PASSES):
         found = least_squares(left, first, "3-point", bounds, x_scale="jac", xtol=1e-10)
         first = found.x
-        residuals = y - _friction_while_locked(x, first, unloads)
-        jacobian = _jacobian(x, first, unloads)
+        residuals = y - _compute_friction_while_locked(x, first, unloads)
+        jacobian = _compute_locked_friction_jacobian(x, first, unloads)
         least = max(noise_sd * 1e-3, 1e-12)
-        noise = fit_noise(AUTOREGRESSIVE_NOISE_NAME, time, residuals, jacobian, min_noise_sd=least)
+        noise = fit_noise_model(
+            AUTOREGRESSIVE_NOISE_NAME, time, residuals, jacobian, min_noise_sd=least
+        )
         innovations = noise.whiten_columns(residuals[:, None])[:, 0]
         noise_sd = max(float(np.linalg.norm(innovations)) / math.sqrt(len(y) - 3), least)
     whitened = noise.whiten_columns(jacobian) / noise_sd
@@ -347,31 +356,38 @@ def fit_stiffness(portion: Portion) -> tuple[float, float]:
     return stiffness, stiffness * math.sqrt(covariance[1, 1])
 
 
-def _jacobian(x: np.ndarray, parameters: np.ndarray, unloads: bool) -> np.ndarray:
+def _compute_locked_friction_jacobian(
+    displacement: np.ndarray, parameters: np.ndarray, is_unloading: bool
+) -> np.ndarray:
     """Return the derivatives of friction with respect to the parameters."""
     columns = []
     for number in range(len(parameters)):
         step = np.zeros(len(parameters))
         step[number] = 1e-5
-        ends = (_friction_while_locked(x, parameters + sign * step, unloads) for sign in (1, -1))
+        ends = (
+            _compute_friction_while_locked(displacement, parameters + sign * step, is_unloading)
+            for sign in (1, -1)
+        )
         columns.append((next(ends) - next(ends)) / 2e-5)
     return np.column_stack(columns)
 
 
-def _friction_while_locked(x: np.ndarray, parameters: np.ndarray, unloads: bool) -> np.ndarray:
+def _compute_friction_while_locked(
+    displacement: np.ndarray, parameters: np.ndarray, is_unloading: bool
+) -> np.ndarray:
     """Compute friction of an almost locked fault.
 
     The parameters are friction at x = 0, ln k, ln |v|, ln a and g.
     """
     level, log_k, log_rate, log_a, g = parameters.tolist()
     k, a = math.exp(log_k), math.exp(log_a)
-    z = np.minimum(k * x / a, 600.0)
-    if unloads:
+    z = np.minimum(k * displacement / a, 600.0)
+    if is_unloading:
         rate = -math.exp(log_rate)
     else:  # The slip rate ratio belongs to the last row.
-        end = math.exp(-min(k * x[-1] / a, 600.0))
+        end = math.exp(-min(k * displacement[-1] / a, 600.0))
         rate = 1.0 / max(math.exp(-log_rate) / end + g * (1.0 / end - 1.0), 1e-300)
     loss = rate * np.expm1(z)
     if abs(g) > 1e-6:
         loss = -np.log1p(np.maximum(-g * loss, -1.0 + 1e-12)) / g
-    return np.asarray(level + k * x - a * loss)
+    return np.asarray(level + k * displacement - a * loss)

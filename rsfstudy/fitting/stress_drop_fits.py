@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.fitting.drop_detection import Detection, DropCandidate, detect_drops
-from rsfstudy.fitting.drop_fit import FittedStressDrop, fit_drop
+from rsfstudy.fitting.drop_detection import Detection, StressDropCandidate, detect_stress_drops
+from rsfstudy.fitting.drop_fit import FittedStressDrop, fit_stress_drop
 
 #: Scale, table heading and description of each property of an event.
 EVENT_QUANTITIES = {
@@ -35,10 +35,10 @@ EVENT_QUANTITIES = {
 EventNumbers = tuple[dict[str, tuple[float, float]], int]
 #: A stress drop is accepted if the ratio of its size to the half width of the 95 % confidence
 #: interval of its size exceeds this value.
-_MIN_DROP_OVER_ITS_ERROR = 1.0
+_MIN_DROP_SIZE_OVER_CI_HALF_WIDTH = 1.0
 
 
-class FittedDropCandidate(NamedTuple):
+class DetectedAndFittedStressDrop(NamedTuple):
     """Fitted stress drop and the corresponding detected drop.
 
     Parameters
@@ -49,11 +49,13 @@ class FittedDropCandidate(NamedTuple):
         Detected drop.
     """
 
-    drop: FittedStressDrop
-    candidate: DropCandidate
+    fitted_drop: FittedStressDrop
+    detected_drop: StressDropCandidate
 
 
-def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCandidate], Detection]:
+def find_stress_drops(
+    time: np.ndarray, stress: np.ndarray
+) -> tuple[list[DetectedAndFittedStressDrop], Detection]:
     """Find and fit the stress drops in a record.
 
     If two fitted drops overlap, the two detected drops are merged and fitted again as a single
@@ -71,7 +73,7 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCan
     detection : Detection
         Result of the detection.
     """
-    detection = detect_drops(time, stress)
+    detection = detect_stress_drops(time, stress)
     candidates = detection.candidates
     while True:
         found = _fit_drop_candidates(time, stress, candidates, detection)
@@ -82,10 +84,11 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCan
     sure = [
         of
         for of in found
-        if _compute_drop_size(of.drop) > _MIN_DROP_OVER_ITS_ERROR * of.drop.drop_error
+        if _compute_drop_size(of.fitted_drop)
+        > _MIN_DROP_SIZE_OVER_CI_HALF_WIDTH * of.fitted_drop.stress_drop_error
     ]
     if sure:  # Slow drops increase the noise estimate of long windows.
-        residual = float(np.median([of.drop.residual_sd for of in sure]))
+        residual = float(np.median([of.fitted_drop.residual_sd for of in sure]))
         detection = detection._replace(noise_sd=min(detection.noise_sd, residual))
     return sure, detection
 
@@ -96,31 +99,38 @@ def _compute_drop_size(drop: FittedStressDrop) -> float:
 
 
 def _fit_drop_candidates(
-    time: np.ndarray, stress: np.ndarray, candidates: list[DropCandidate], detection: Detection
-) -> list[FittedDropCandidate]:
+    time: np.ndarray,
+    stress: np.ndarray,
+    candidates: list[StressDropCandidate],
+    detection: Detection,
+) -> list[DetectedAndFittedStressDrop]:
     """Fit each detected drop within the interval between its neighbours."""
     ends = [float(time[0]), *(one.end_time for one in candidates)]
     begins = [*(one.start_time for one in candidates[1:]), float(time[-1])]
     return [
-        FittedDropCandidate(fit_drop(time, stress, one, room, detection.noise_sd), one)
+        DetectedAndFittedStressDrop(
+            fit_stress_drop(time, stress, one, room, detection.noise_sd), one
+        )
         for one, room in zip(candidates, zip(ends, begins, strict=False), strict=False)
     ]
 
 
 def _merge_overlapping_drop_candidates(
-    fitted_candidates: list[FittedDropCandidate],
-) -> list[DropCandidate]:
+    detected_and_fitted_drops: list[DetectedAndFittedStressDrop],
+) -> list[StressDropCandidate]:
     """Merge the detected drops whose fits overlap."""
-    merged: list[DropCandidate] = []
+    merged: list[StressDropCandidate] = []
     reached = -np.inf
-    for drop, candidate in fitted_candidates:
+    for drop, candidate in detected_and_fitted_drops:
         if merged and drop.start_time < reached:
             last = merged[-1]
-            window = max(last.window_duration, candidate.window_duration)
-            error = min(last.mean_difference_stderr, candidate.mean_difference_stderr)
-            correlation = max(last.noise_correlation_factor, candidate.noise_correlation_factor)
+            window = max(last.averaging_window_duration, candidate.averaging_window_duration)
+            error = min(last.window_mean_difference_stderr, candidate.window_mean_difference_stderr)
+            correlation = max(
+                last.stderr_factor_of_correlated_noise, candidate.stderr_factor_of_correlated_noise
+            )
             ends = max(last.end_time, candidate.end_time)
-            merged[-1] = DropCandidate(last.start_time, ends, window, error, correlation)
+            merged[-1] = StressDropCandidate(last.start_time, ends, window, error, correlation)
         else:
             merged.append(candidate)
         reached = max(reached, drop.end_time)

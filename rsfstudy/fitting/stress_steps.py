@@ -47,7 +47,7 @@ _RAMP_FIT_CHANGE_FRACTIONS, _MIN_RAMP_ROWS = (0.1, 0.9), 3
 _STANDARD_DEVIATION_PER_MAD = 1.4826
 
 
-class StressStep(NamedTuple):
+class NormalStressStep(NamedTuple):
     """Step of normal stress at a constant rate of change.
 
     Parameters
@@ -60,11 +60,11 @@ class StressStep(NamedTuple):
 
     start_time: float
     end_time: float
-    stress_before: float
-    stress_after: float
+    normal_stress_before: float
+    normal_stress_after: float
 
 
-def find_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[StressStep]:
+def find_normal_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[NormalStressStep]:
     """Detect the steps of normal stress in a record.
 
     Parameters
@@ -80,7 +80,7 @@ def find_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[Stres
     every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
     count = len(time) // every * every
     t, s = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, normal_stress))
-    found: list[tuple[slice, StressStep]] = []
+    found: list[tuple[slice, NormalStressStep]] = []
     windows = sorted(
         {max(len(t) // parts, _MIN_ROWS_PER_RECORD_PART) for parts in _RECORD_PARTITION_COUNTS}
     )
@@ -88,9 +88,9 @@ def find_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[Stres
         for rows in _find_stress_level_changes(s, window):
             if any(rows.start < other.stop and other.start < rows.stop for other, _ in found):
                 continue
-            before, after = _median_stress_before_and_after(s, rows, window, window)
+            before, after = _compute_median_stress_beside_change(s, rows, window, window)
             lasting = (
-                _median_stress_before_and_after(s, rows, window, longer)
+                _compute_median_stress_beside_change(s, rows, window, longer)
                 if longer
                 else (before, after)
             )
@@ -104,7 +104,7 @@ def find_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[Stres
     return sorted(step for _rows, step in found)
 
 
-def _median_stress_before_and_after(
+def _compute_median_stress_beside_change(
     stress: np.ndarray, change_rows: slice, window_rows: int, median_row_count: int
 ) -> tuple[float, float]:
     """Compute the median normal stress before and after a change.
@@ -158,9 +158,9 @@ def _find_stress_level_changes(stress: np.ndarray, window_rows: int) -> list[sli
     return [slice(rows.start, rows.stop - 1 + 2 * window_rows) for rows in inside]
 
 
-def merge_stress_into_velocity_steps(
+def merge_normal_stress_and_velocity_steps(
     velocity_steps: Sequence[LoadingStep],
-    stress_steps: Sequence[StressStep],
+    stress_steps: Sequence[NormalStressStep],
     default_velocity: float,
 ) -> tuple[LoadingStep, ...]:
     """Merge steps of normal stress with steps of load point velocity.
@@ -202,9 +202,9 @@ def merge_stress_into_velocity_steps(
     return tuple(sorted(found, key=lambda step: step.start))
 
 
-def set_stress_levels(
+def set_normal_stresses_of_steps(
     steps: Sequence[LoadingStep],
-    stress_steps: Sequence[StressStep],
+    stress_steps: Sequence[NormalStressStep],
     time: np.ndarray,
     stress: np.ndarray,
 ) -> tuple[LoadingStep, ...]:
@@ -237,7 +237,9 @@ def set_stress_levels(
             rows = stress[(time >= earlier) & (time <= later)]
             level = float(np.median(rows)) if rows.size else math.nan
             before, after = (
-                (during[0].stress_before, during[-1].stress_after) if during else (level, level)
+                (during[0].normal_stress_before, during[-1].normal_stress_after)
+                if during
+                else (level, level)
             )
             step = step._replace(stress_before=before, stress_after=after)
         if step.start == step.end and step.stress_ratio != 1.0:
@@ -248,7 +250,7 @@ def set_stress_levels(
     return tuple(found)
 
 
-def _step_overlaps_stress_change(step: LoadingStep, stress_step: StressStep) -> bool:
+def _step_overlaps_stress_change(step: LoadingStep, stress_step: NormalStressStep) -> bool:
     """Return True if the normal stress changes during or close to a step."""
     near = stress_step.end_time - stress_step.start_time
     return step.start - near <= stress_step.end_time and stress_step.start_time <= step.end + near
@@ -256,7 +258,7 @@ def _step_overlaps_stress_change(step: LoadingStep, stress_step: StressStep) -> 
 
 def _fit_linear_stress_ramp(
     time: np.ndarray, stress: np.ndarray, stress_before: float, stress_after: float
-) -> StressStep:
+) -> NormalStressStep:
     """Fit a ramp between two levels of normal stress."""
     share = (stress - stress_before) / (stress_after - stress_before)
     # The row ``middle`` is the best boundary between rows below and above half of the change.
@@ -266,9 +268,9 @@ def _fit_linear_stress_ramp(
     last = middle + int(reached[0]) if len(reached) else len(share) - 1
     on_way = np.arange(first + 1, last)
     if len(on_way) < _MIN_RAMP_ROWS:
-        return StressStep(float(time[first]), float(time[last]), stress_before, stress_after)
+        return NormalStressStep(float(time[first]), float(time[last]), stress_before, stress_after)
     slope, offset = np.polyfit(time[on_way] - time[first], share[on_way], 1)
     begins, ends = (time[first] + (x - offset) / slope for x in (0.0, 1.0))
-    return StressStep(
+    return NormalStressStep(
         float(max(begins, time[0])), float(min(ends, time[-1])), stress_before, stress_after
     )

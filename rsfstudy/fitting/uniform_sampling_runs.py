@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 #: Two sampling intervals belong to different classes if their ratio exceeds this value.
-_MAX_SAMPLING_INTERVAL_RATIO = 2.0
+_MAX_INTERVAL_RATIO_WITHIN_CLASS = 2.0
 #: Number of rows in the running mean of the sampling intervals, smallest number of rows of a class
 #: with a separate noise process, and smallest number of rows of a run.
 _RUNNING_MEAN_ROWS, _MIN_ROWS_PER_NOISE_PROCESS, _MIN_ROWS_PER_SAMPLING_RUN = 15, 100, 30
@@ -52,7 +52,7 @@ class SamplingRun(NamedTuple):
     start_row: int
     stop_row: int
     noise_process_index: int
-    row_count_since_clock_start: int
+    row_count_since_time_restart: int
     noise_level_index: int
 
 
@@ -81,7 +81,7 @@ def find_sampling_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
     return tuple(found)
 
 
-def split_runs_at_level_changes(
+def split_runs_at_noise_level_changes(
     runs: Sequence[SamplingRun], change_rows: Sequence[int]
 ) -> tuple[SamplingRun, ...]:
     """Split sampling runs at changes in the noise level.
@@ -116,7 +116,7 @@ def split_runs_at_level_changes(
                     first,
                     last,
                     run.noise_process_index,
-                    run.row_count_since_clock_start + first - run.start_row,
+                    run.row_count_since_time_restart + first - run.start_row,
                     level,
                 )
             )
@@ -139,7 +139,7 @@ def count_noise_processes(runs: Sequence[SamplingRun]) -> int:
     return 1 + max(run.noise_process_index for run in runs)
 
 
-def repeat_run_field_per_row(runs: Sequence[SamplingRun], run_field_name: str) -> np.ndarray:
+def expand_run_field_to_rows(runs: Sequence[SamplingRun], run_field_name: str) -> np.ndarray:
     """Return the index of the noise process or the noise level of each row.
 
     Parameters
@@ -161,7 +161,7 @@ def repeat_run_field_per_row(runs: Sequence[SamplingRun], run_field_name: str) -
 
 
 def find_noise_level_changes(
-    whitened_residuals: np.ndarray, min_absolute_value: float = 0.0
+    whitened_residuals: np.ndarray, min_absolute_difference: float = 0.0
 ) -> list[int]:
     """Find the rows at which the standard deviation of the noise changes.
 
@@ -186,7 +186,7 @@ def find_noise_level_changes(
         _MIN_ROWS_PER_NOISE_LEVEL, math.ceil(_MIN_RECORD_FRACTION_PER_NOISE_LEVEL * count)
     )
     least = _MIN_ABSOLUTE_VALUE_OVER_RMS * float(np.sqrt(np.mean(np.square(size)))) or 1.0
-    logs = np.log(np.maximum(size, max(least, min_absolute_value)))
+    logs = np.log(np.maximum(size, max(least, min_absolute_difference)))
     sums = np.concatenate([[0.0], np.cumsum(logs - logs.mean())])
     segments, found = [(0, count)], []
     while segments:
@@ -207,13 +207,15 @@ def find_noise_level_changes(
             found.append((float(gains[best]), int(at[best])))
             segments += [(first, int(at[best])), (int(at[best]), last)]
     rows = sorted(row for _gain, row in sorted(found, reverse=True)[:_MAX_LEVEL_CHANGES])
-    squares = np.square(np.maximum(np.abs(whitened_residuals), max(least, min_absolute_value)))
+    squares = np.square(np.maximum(np.abs(whitened_residuals), max(least, min_absolute_difference)))
     bounds = [0, *rows, count]
-    return [_refine_noise_level_change(squares, *bounds[n : n + 3]) for n in range(len(rows))]
+    return [
+        _refine_row_of_noise_level_change(squares, *bounds[n : n + 3]) for n in range(len(rows))
+    ]
 
 
-def _refine_noise_level_change(
-    squared_residuals: np.ndarray, first_row: int, initial_row: int, last_row: int
+def _refine_row_of_noise_level_change(
+    squared_residuals: np.ndarray, first_row: int, initial_row: int, stop_row: int
 ) -> int:
     """Refine the location of a noise level change by maximum likelihood.
 
@@ -231,11 +233,11 @@ def _refine_noise_level_change(
         Row at which the noise level changes.
     """
     reach = min(
-        _MIN_ROWS_PER_SAMPLING_RUN, (initial_row - first_row) // 2, (last_row - initial_row) // 2
+        _MIN_ROWS_PER_SAMPLING_RUN, (initial_row - first_row) // 2, (stop_row - initial_row) // 2
     )
     before, after = (
         squared_residuals[first_row : initial_row - reach].mean(),
-        squared_residuals[initial_row + reach : last_row].mean(),
+        squared_residuals[initial_row + reach : stop_row].mean(),
     )
     near = squared_residuals[initial_row - reach : initial_row + reach]
     costs = near * (1.0 / before - 1.0 / after) + math.log(before / after)
@@ -253,7 +255,7 @@ def _classify_sampling_intervals(time: np.ndarray) -> np.ndarray:
     gaps = np.diff(time)
     gaps[gaps <= 0.0] = np.median(gaps)
     smooth = np.log(uniform_filter1d(gaps, min(_RUNNING_MEAN_ROWS, len(gaps)), mode="nearest"))
-    kinds = np.rint((smooth - np.median(smooth)) / math.log(_MAX_SAMPLING_INTERVAL_RATIO))
+    kinds = np.rint((smooth - np.median(smooth)) / math.log(_MAX_INTERVAL_RATIO_WITHIN_CLASS))
     kinds = np.append(kinds[:1], kinds)
     lasts = np.diff([0, *(np.flatnonzero(np.diff(kinds)) + 1), len(kinds)])
     steady = np.repeat(lasts, lasts) >= _MIN_ROWS_PER_SAMPLING_RUN

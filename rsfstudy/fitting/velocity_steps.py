@@ -141,13 +141,17 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     if len(t) < 2 * _MIN_SEGMENT_ROWS:
         return ()
     t0, x0 = t[0], x[0]
-    variance, louder = noise_variance(t, x), _local_noise_over_global_noise(t, x)
+    variance, louder = noise_variance(t, x), _compute_local_over_global_noise(t, x)
     sums = CumulativeLineFitSums(t - t0, x - x0, 1.0 / louder**2)
-    knots = sorted(split_rows_into_segments(sums.line_residual_squares, 0, len(t), variance))
+    knots = sorted(
+        split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
+    )
     knots = _merge_similar_segments(sums, knots, t, variance, louder)
     lines = [sums.fit_line(i, j) for i, j in itertools.pairwise(knots)]
     meets = [
-        _line_intersection_time(lines[n], lines[n + 1], (t[k - 1] - t0, t[k] - t0), variance)
+        _compute_line_intersection_time(
+            lines[n], lines[n + 1], (t[k - 1] - t0, t[k] - t0), variance
+        )
         for n, k in enumerate(knots[1:-1])
     ]
     if every > 1:
@@ -162,7 +166,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
         for line in lines
     ]
     found = []
-    for first, last in _group_velocity_changes(
+    for first, last in _group_velocity_changes_into_steps(
         meets, speeds, np.diff(knots).tolist(), (0.0, t[-1] - t0)
     ):
         begins, ends = meets[first], meets[last]
@@ -209,7 +213,7 @@ class CumulativeLineFitSums:
         )
         self.cumulative_sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
 
-    def compute_moments(
+    def compute_weighted_moments(
         self, start_row: np.ndarray | int, stop_row: np.ndarray | int
     ) -> tuple[np.ndarray, ...]:
         """Compute the weighted moments of a range of rows.
@@ -231,7 +235,7 @@ class CumulativeLineFitSums:
         mt, mx = st / n, sx / n
         return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
 
-    def line_residual_squares(
+    def compute_line_residual_squares(
         self, start_row: np.ndarray | int, stop_row: np.ndarray | int
     ) -> np.ndarray:
         """Compute the sum of squared residuals of a line fit.
@@ -246,10 +250,10 @@ class CumulativeLineFitSums:
         ndarray
             Weighted sum of squared residuals of each range.
         """
-        _mt, _mx, tt, tx, xx = self.compute_moments(start_row, stop_row)
+        _mt, _mx, tt, tx, xx = self.compute_weighted_moments(start_row, stop_row)
         return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
 
-    def squares_about_mean(
+    def compute_squares_about_mean(
         self, start_row: np.ndarray | int, stop_row: np.ndarray | int
     ) -> np.ndarray:
         """Compute the sum of squared deviations from the mean.
@@ -264,7 +268,7 @@ class CumulativeLineFitSums:
         ndarray
             Weighted sum of squared deviations of each range.
         """
-        return np.asarray(np.maximum(self.compute_moments(start_row, stop_row)[4], 0.0))
+        return np.asarray(np.maximum(self.compute_weighted_moments(start_row, stop_row)[4], 0.0))
 
     def fit_line(self, start_row: int, stop_row: int) -> _InterceptAndSlope:
         """Fit a line to a range of rows.
@@ -281,11 +285,11 @@ class CumulativeLineFitSums:
         slope : float
             Slope of the line.
         """
-        mt, mx, tt, tx, _xx = self.compute_moments(start_row, stop_row)
+        mt, mx, tt, tx, _xx = self.compute_weighted_moments(start_row, stop_row)
         return float(mx - tx / tt * mt), float(tx / tt)
 
 
-def _deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+def _compute_deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Compute the deviation of each sample from the line through its neighbours.
 
     The deviations are multiplied by a constant factor, which is chosen so that deviations of white
@@ -297,7 +301,7 @@ def _deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> n
     return np.asarray(off)
 
 
-def _local_noise_over_global_noise(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+def _compute_local_over_global_noise(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Estimate the local noise of the displacement, relative to the typical noise.
 
     Returns
@@ -305,7 +309,7 @@ def _local_noise_over_global_noise(time: np.ndarray, displacement: np.ndarray) -
     ndarray, shape (rows,)
         Ratio of the local noise to the typical noise, or 1 if the ratio is less than 2.
     """
-    off = np.abs(_deviations_from_neighbours(time, displacement))
+    off = np.abs(_compute_deviations_from_neighbours(time, displacement))
     typical = float(np.median(off))
     if len(off) < 4 * _LOCAL_NOISE_ROWS or not typical > 0.0:
         return np.ones(len(time))
@@ -352,16 +356,16 @@ def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
     0.01
     """
     spread = _STANDARD_DEVIATION_PER_MAD * float(
-        np.median(np.abs(_deviations_from_neighbours(t, x)))
+        np.median(np.abs(_compute_deviations_from_neighbours(t, x)))
     )
     least = 1e-9 * float(np.ptp(x))  # A synthetic record may have no noise.
     return max(spread, least) ** 2
 
 
 def split_rows_into_segments(
-    residual_squares: ResidualSquaresFunction,
+    residual_squares_function: ResidualSquaresFunction,
     first_row: int,
-    last_row: int,
+    stop_row: int,
     variance_of_noise: float,
 ) -> set[int]:
     """Split rows into segments by binary segmentation.
@@ -383,16 +387,16 @@ def split_rows_into_segments(
     set of int
         First row of each segment, and the row ``last_row`` after the last segment.
     """
-    open_parts, found = [(first_row, last_row)], {first_row, last_row}
+    open_parts, found = [(first_row, stop_row)], {first_row, stop_row}
     while open_parts:
         i, j = open_parts.pop()
         at = np.arange(i + _MIN_SEGMENT_ROWS, j - _MIN_SEGMENT_ROWS + 1)
         if not len(at):
             continue
-        both = residual_squares(i, at) + residual_squares(at, j)
+        both = residual_squares_function(i, at) + residual_squares_function(at, j)
         best = int(at[np.argmin(both)])
         if (
-            residual_squares(i, j) - both.min()
+            residual_squares_function(i, j) - both.min()
             > _MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT * math.log(j - i) * variance_of_noise
         ):
             found.add(best)
@@ -415,7 +419,7 @@ def _merge_similar_segments(
         pieces = [*itertools.pairwise(segment_boundaries)]
         speeds = np.array([line_fit_sums.fit_line(i, j)[1] for i, j in pieces])
         squares = (
-            sum(float(line_fit_sums.line_residual_squares(i, j)) for i, j in pieces)
+            sum(float(line_fit_sums.compute_line_residual_squares(i, j)) for i, j in pieces)
             / segment_boundaries[-1]
         )
         left = math.sqrt(max(squares, variance_of_noise)) * _compute_noise_at_segment_boundaries(
@@ -438,7 +442,7 @@ def _merge_similar_segments(
     return segment_boundaries
 
 
-def _line_intersection_time(
+def _compute_line_intersection_time(
     first_line: _InterceptAndSlope,
     second_line: _InterceptAndSlope,
     boundary_times: tuple[float, float],
@@ -475,16 +479,20 @@ def _refine_line_intersection_time(
     t, x = time[i:j] - initial_time, displacement[i:j]
     sums = CumulativeLineFitSums(t, x - x[0], np.ones(j - i))
     places = np.arange(_MIN_SEGMENT_ROWS, j - i - _MIN_SEGMENT_ROWS)
-    both = sums.line_residual_squares(0, places) + sums.line_residual_squares(places, j - i)
+    both = sums.compute_line_residual_squares(0, places) + sums.compute_line_residual_squares(
+        places, j - i
+    )
     best = int(places[np.argmin(both)])
     lines = sums.fit_line(0, best), sums.fit_line(best, j - i)
-    return initial_time + _line_intersection_time(*lines, (t[best - 1], t[best]), variance_of_noise)
+    return initial_time + _compute_line_intersection_time(
+        *lines, (t[best - 1], t[best]), variance_of_noise
+    )
 
 
-def _group_velocity_changes(
+def _group_velocity_changes_into_steps(
     times: list[float],
     velocities: list[float],
-    boundary_rows: list[int],
+    segment_row_counts: list[int],
     end_times: tuple[float, float],
 ) -> Iterator[tuple[int, int]]:
     """Group successive velocity changes into steps.
@@ -503,7 +511,7 @@ def _group_velocity_changes(
     def is_short(first: int, last: int) -> bool:
         before = times[first] - (times[first - 1] if first else end_times[0])
         lasts = times[last] - times[first]
-        return boundary_rows[
+        return segment_row_counts[
             last
         ] < _MAX_RAMP_SEGMENT_ROWS or lasts < _MAX_RAMP_SEGMENT_OVER_NEIGHBOURS * min(
             before, end_times[1] - times[last]
@@ -528,13 +536,16 @@ def _group_velocity_changes(
 
 
 def _velocity_returns_after_overshoot(
-    velocities: list[float], first_change: int, last_change: int, return_change: int
+    velocities: list[float],
+    first_change_index: int,
+    last_change_index: int,
+    return_change_index: int,
 ) -> bool:
     """Return True if the velocity returns partially after an overshoot."""
     before, peak, after = (
-        velocities[first_change],
-        velocities[last_change + 1],
-        velocities[return_change + 1],
+        velocities[first_change_index],
+        velocities[last_change_index + 1],
+        velocities[return_change_index + 1],
     )
     change = abs(after - before)
     returns = min(before, peak) < after < max(before, peak)

@@ -25,7 +25,7 @@ from rsfstudy.status import Status
 ParameterValues = Mapping[str, float]
 #: Relative step size and order of a finite difference. The step size is relative to the scale of
 #: the parameter. The order is 2 or 4.
-DifferenceScheme = tuple[float, int]
+FiniteDifferenceScheme = tuple[float, int]
 
 #: Parameters that a fit may determine, by name.
 PARAMETERS = {
@@ -209,12 +209,12 @@ class WindowModel:
 
     scene: Scene
     time: np.ndarray
-    displacement: np.ndarray
-    friction: np.ndarray
+    load_point_displacement: np.ndarray
+    recorded_friction: np.ndarray
     loading_segments: np.ndarray
     integrator: Integrator
     loadings_with_shifted_steps: Sequence[np.ndarray] = ()
-    filter: Filter | None = None
+    friction_filter: Filter | None = None
 
     @property
     def initial_velocity(self) -> float:
@@ -247,11 +247,11 @@ class WindowModel:
         )
 
     @property
-    def max_loading_delay(self) -> float:
+    def longest_allowed_loading_delay(self) -> float:
         """Largest loading delay in s that the model supports."""
         return float(self.time[0] - self.loading_segments[0, 0])
 
-    def build_scene(self, values: ParameterValues) -> Scene:
+    def build_scene(self, parameter_values: ParameterValues) -> Scene:
         """Build the scene of the window from parameter values.
 
         Parameters
@@ -270,7 +270,7 @@ class WindowModel:
         InvalidValue
             If a parameter is outside its domain.
         """
-        distance, velocity = values["slip_distance"], self.initial_velocity
+        distance, velocity = parameter_values["slip_distance"], self.initial_velocity
         columns = np.empty((len(self.loading_segments), 4))
         columns[:, 0] = (
             (self.loading_segments[:, 0] - self.loading_segments[0, 0]) * velocity / distance
@@ -280,11 +280,13 @@ class WindowModel:
         columns[:, 3] = self.loading_segments[:, 3] * distance / velocity
         history = SampledHistory.from_table(columns, self.has_normal_stress_change, "record")
         parts = self.scene.parts._replace(loading=history)
-        return Scene(replace_field_values(parts, parameters_to_fields(values, velocity)))
+        return Scene(
+            replace_field_values(parts, fit_parameters_to_scene_fields(parameter_values, velocity))
+        )
 
-    def model_friction(
+    def compute_model_friction(
         self,
-        values: ParameterValues,
+        parameter_values: ParameterValues,
         *,
         with_refined_tolerances: bool = False,
         require_stable: bool = False,
@@ -319,20 +321,30 @@ class WindowModel:
             If the work budget is exhausted.
         """
         budget, nothing = self.integrator.work_meter.budget, np.full(len(self.time), math.nan)
-        stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]
+        stiff = (
+            4.0
+            * parameter_values["stiffness"]
+            * float(np.ptp(self.load_point_displacement))
+            / parameter_values["a"]
+        )
         most = (
             _MAX_EVALUATIONS
             + _MAX_EVALUATIONS_PER_SEGMENT * len(self.loading_segments)
             + int(min(stiff, _MAX_EVALUATIONS_FOR_STIFF_SPRING))
         )
         try:
-            scene = self.build_scene(values)
-            swapped = values.get("slip_distance_2", math.inf) <= values["slip_distance"]
+            scene = self.build_scene(parameter_values)
+            swapped = (
+                parameter_values.get("slip_distance_2", math.inf)
+                <= parameter_values["slip_distance"]
+            )
             if require_stable and (swapped or not scene.stiffness > scene.critical_stiffness):
                 return nothing
-            late = values.get("step_time", 0.0)
-            scale = self.initial_velocity / values["slip_distance"]
-            times = self.filter.sample_times(self.time) if self.filter else self.time
+            late = parameter_values.get("step_time", 0.0)
+            scale = self.initial_velocity / parameter_values["slip_distance"]
+            times = (
+                self.friction_filter.sample_times(self.time) if self.friction_filter else self.time
+            )
             at = np.maximum(times - late - self.loading_segments[0, 0], 0.0) * scale
             integrator = self.integrator.refined() if with_refined_tolerances else self.integrator
             recording, end = Recording(sample_times=at), float(at[-1]) * (1.0 + 1e-12)
@@ -350,12 +362,12 @@ class WindowModel:
             return nothing
         finally:
             self.integrator.work_meter.budget = budget
-        found = Recording.friction_coefficient(recording.as_table(scene))
+        found = Recording.get_friction_coefficient(recording.as_table(scene))
         if len(found) != len(times):
             return nothing
-        return self.filter.apply(self.time, found) if self.filter else found
+        return self.friction_filter.apply(self.time, found) if self.friction_filter else found
 
-    def compute_friction_trend(self, values: ParameterValues) -> np.ndarray:
+    def compute_friction_trend(self, parameter_values: ParameterValues) -> np.ndarray:
         r"""Compute the trend at each row.
 
         Parameters
@@ -369,10 +381,14 @@ class WindowModel:
             Trend :math:`c_1 x + c_2 x^2 + \dots` for the displacement :math:`x` from the first step
             in um.
         """
-        powers = [(int(name[5:]), c) for name, c in values.items() if name.startswith("trend")]
-        return sum((c * self.displacement**n for n, c in powers), np.zeros(len(self.time)))
+        powers = [
+            (int(name[5:]), c) for name, c in parameter_values.items() if name.startswith("trend")
+        ]
+        return sum(
+            (c * self.load_point_displacement**n for n, c in powers), np.zeros(len(self.time))
+        )
 
-    def compute_loading_error_sensitivity(self, values: ParameterValues) -> np.ndarray:
+    def compute_loading_error_sensitivity(self, parameter_values: ParameterValues) -> np.ndarray:
         """Compute the changes in friction due to errors of the loading.
 
         Parameters
@@ -389,19 +405,19 @@ class WindowModel:
         if not self.loadings_with_shifted_steps:
             return np.zeros((len(self.time), 0))
         curves = [
-            replace(self, loading_segments=moved).model_friction(values)
+            replace(self, loading_segments=moved).compute_model_friction(parameter_values)
             for moved in self.loadings_with_shifted_steps
         ]
         return (
-            np.asarray(np.array(curves) - self.model_friction(values)).T
+            np.asarray(np.array(curves) - self.compute_model_friction(parameter_values)).T
             / LOADING_STEP_SHIFT_OVER_STANDARD_ERROR
         )
 
-    def jacobian(
+    def compute_jacobian(
         self,
-        values: ParameterValues,
+        parameter_values: ParameterValues,
         free_parameters: Sequence[str],
-        difference_scheme: DifferenceScheme = ACCURATE_DIFFERENCE_SCHEME,
+        difference_scheme: FiniteDifferenceScheme = ACCURATE_DIFFERENCE_SCHEME,
     ) -> np.ndarray:
         r"""Compute the derivatives of friction with respect to parameters.
 
@@ -437,31 +453,36 @@ class WindowModel:
         """
         return np.column_stack(
             [
-                self._compute_friction_derivative(values, name, difference_scheme)
+                self._compute_friction_derivative(parameter_values, name, difference_scheme)
                 for name in free_parameters
             ]
         )
 
     def _compute_friction_derivative(
-        self, values: ParameterValues, parameter_name: str, difference_scheme: DifferenceScheme
+        self,
+        parameter_values: ParameterValues,
+        parameter_name: str,
+        difference_scheme: FiniteDifferenceScheme,
     ) -> np.ndarray:
         """Compute the derivative of friction with respect to a parameter."""
         if parameter_name.startswith("trend"):
-            return np.asarray(self.displacement ** int(parameter_name[5:]))
+            return np.asarray(self.load_point_displacement ** int(parameter_name[5:]))
         if self.is_linear_in_parameter(parameter_name):
             return np.ones(len(self.time))
         (part, order), size = (
             difference_scheme,
-            self._typical_parameter_size(parameter_name, values),
+            self._find_typical_parameter_size(parameter_name, parameter_values),
         )
         if order == 2:
-            return self._central_difference(
-                values, parameter_name, part * size, 2.0, with_refined_tolerances=False
+            return self._compute_central_difference(
+                parameter_values, parameter_name, part * size, 2.0, with_refined_tolerances=False
             )
         best, least = np.full(len(self.time), math.nan), math.inf
         for _ in range(_MAX_DIFFERENCE_STEP_REDUCTIONS):
             near, far = (
-                self._central_difference(values, parameter_name, n * part * size, 4.0 / n)
+                self._compute_central_difference(
+                    parameter_values, parameter_name, n * part * size, 4.0 / n
+                )
                 for n in (1.0, 2.0)
             )
             largest = float(np.abs(near).max()) or 1.0
@@ -479,11 +500,11 @@ class WindowModel:
             )
         return best
 
-    def _central_difference(
+    def _compute_central_difference(
         self,
-        values: ParameterValues,
+        parameter_values: ParameterValues,
         parameter_name: str,
-        step: float,
+        step_size: float,
         min_steps_from_domain_end: float,
         *,
         with_refined_tolerances: bool = True,
@@ -496,30 +517,38 @@ class WindowModel:
         low, high = _PARAMETER_DOMAINS.get(parameter_name, (-math.inf, math.inf))
         weights = {1.0: 0.5, -1.0: -0.5}
         if (
-            not low + min_steps_from_domain_end * step
-            <= values[parameter_name]
-            <= high - min_steps_from_domain_end * step
+            not low + min_steps_from_domain_end * step_size
+            <= parameter_values[parameter_name]
+            <= high - min_steps_from_domain_end * step_size
         ):
-            side = 1.0 if values[parameter_name] < low + min_steps_from_domain_end * step else -1.0
+            side = (
+                1.0
+                if parameter_values[parameter_name] < low + min_steps_from_domain_end * step_size
+                else -1.0
+            )
             weights = {0.0: -1.5 * side, side: 2.0 * side, 2.0 * side: -0.5 * side}
         found = np.zeros(len(self.time))
         for place, weight in weights.items():
-            moved = shift_parameter(values, parameter_name, place * step)
+            moved = shift_parameter(parameter_values, parameter_name, place * step_size)
             found += (
                 weight
-                / step
-                * self.model_friction(moved, with_refined_tolerances=with_refined_tolerances)
+                / step_size
+                * self.compute_model_friction(
+                    moved, with_refined_tolerances=with_refined_tolerances
+                )
             )
         return found
 
-    def _typical_parameter_size(self, parameter_name: str, values: ParameterValues) -> float:
+    def _find_typical_parameter_size(
+        self, parameter_name: str, parameter_values: ParameterValues
+    ) -> float:
         """Return the parameter scale for the step size of finite differences."""
         if parameter_name in LOGARITHMIC_PARAMETERS:
             return 1.0
         if parameter_name == "a":
-            return values["a"]
+            return parameter_values["a"]
         if parameter_name.startswith("b"):
-            return max(values["a"], abs(values[parameter_name]))
+            return max(parameter_values["a"], abs(parameter_values[parameter_name]))
         return _TYPICAL_PARAMETER_SIZES.get(parameter_name, 1.0 / self.initial_velocity)
 
 
@@ -566,7 +595,9 @@ def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dic
     return found | {name: stated[name] for name in named if stated.get(name) is not None}
 
 
-def parameters_to_fields(values: ParameterValues, velocity: float) -> dict[str, float]:
+def fit_parameters_to_scene_fields(
+    parameter_values: ParameterValues, velocity_unit: float
+) -> dict[str, float]:
     """Convert fit parameters with units to dimensionless scene fields.
 
     Parameters
@@ -589,21 +620,27 @@ def parameters_to_fields(values: ParameterValues, velocity: float) -> dict[str, 
     >>> {name: round(fields[name], 6) for name in ("stiffness", "reference_rate", "b_over_a")}
     {'stiffness': 0.02, 'reference_rate': 0.1, 'b_over_a': 1.5}
     """
-    a, distance = values["a"], values["slip_distance"]
+    a, distance = parameter_values["a"], parameter_values["slip_distance"]
     fields = {
         "a": a,
-        "mu_star": values["mu_star"],
-        "stiffness": values["stiffness"] * distance,
-        "reference_rate": velocity / distance,
+        "mu_star": parameter_values["mu_star"],
+        "stiffness": parameter_values["stiffness"] * distance,
+        "reference_rate": velocity_unit / distance,
     }
-    fields |= {f"{n}_over_a": values[n] / a for n in ("b", "b1", "b2") if n in values}
-    if "slip_distance_2" in values:
-        fields["length_ratio"] = values["slip_distance_2"] / distance
-    return fields | {name: values[name] for name in ("alpha", "law_exponent") if name in values}
+    fields |= {
+        f"{n}_over_a": parameter_values[n] / a for n in ("b", "b1", "b2") if n in parameter_values
+    }
+    if "slip_distance_2" in parameter_values:
+        fields["length_ratio"] = parameter_values["slip_distance_2"] / distance
+    return fields | {
+        name: parameter_values[name]
+        for name in ("alpha", "law_exponent")
+        if name in parameter_values
+    }
 
 
 def shift_parameter(
-    values: ParameterValues, parameter_name: str, coordinate_change: float
+    parameter_values: ParameterValues, parameter_name: str, fit_coordinate_change: float
 ) -> dict[str, float]:
     """Shift the value of one parameter.
 
@@ -622,14 +659,14 @@ def shift_parameter(
         Values of all parameters, including the shifted parameter.
     """
     moved = (
-        values[parameter_name] * math.exp(coordinate_change)
+        parameter_values[parameter_name] * math.exp(fit_coordinate_change)
         if parameter_name in LOGARITHMIC_PARAMETERS
-        else values[parameter_name] + coordinate_change
+        else parameter_values[parameter_name] + fit_coordinate_change
     )
-    return {**values, parameter_name: moved}
+    return {**parameter_values, parameter_name: moved}
 
 
-def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> float:
+def parameter_to_fit_coordinate(parameter_name: str, parameter_value: float) -> float:
     """Convert the value of a parameter to its fit coordinate.
 
     Parameters
@@ -650,7 +687,7 @@ def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> floa
     )
 
 
-def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
+def fit_coordinate_to_parameter(parameter_name: str, fit_coordinate: float) -> float:
     """Convert a fit coordinate of a parameter to the value of the parameter.
 
     Parameters
@@ -666,10 +703,10 @@ def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
     float
         Value of the parameter.
     """
-    return math.exp(coordinate) if parameter_name in LOGARITHMIC_PARAMETERS else coordinate
+    return math.exp(fit_coordinate) if parameter_name in LOGARITHMIC_PARAMETERS else fit_coordinate
 
 
-def parameter_derivative_by_coordinate(parameter_name: str, parameter_value: float) -> float:
+def compute_derivative_by_fit_coordinate(parameter_name: str, parameter_value: float) -> float:
     """Compute the derivative of a parameter with respect to its fit coordinate.
 
     Parameters

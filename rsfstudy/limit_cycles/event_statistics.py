@@ -25,7 +25,7 @@ import numpy as np
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import INITIAL_PERTURBATION_DISPLACEMENT
-from rsfstudy.limit_cycles.stick_slip_cycles import iterate_cycles
+from rsfstudy.limit_cycles.stick_slip_cycles import iterate_stick_slip_cycles
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import EventKind, Integrator, fall, rise
 from rsfstudy.parts import Segment
@@ -34,23 +34,23 @@ from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Minimum numerical error, divided by the requested relative accuracy.
-_MIN_ERROR_OVER_RTOL = 0.06
+_MIN_ESTIMATED_ERROR_OVER_RTOL = 0.06
 #: Statistics and described quantities, with their symbols and scales.
-_STATISTICS = (
+_MOMENT_NAMES_SYMBOLS_AND_LABELS = (
     ("mean", r"\langle {}\rangle", "mean"),
     ("sd", "s({})", "standard deviation"),
     ("cv", "CV({})", "coefficient of variation"),
 )
-_QUANTITIES = (
+_EVENT_QUANTITIES_WITH_MOMENTS = (
     ("recurrence_interval", "t_r", "recurrence interval", "D_c/V_*"),
     ("static_stress_drop", r"\Delta\tau_s", "static stress drop", "sigma_*"),
 )
 
 
-def _create_outputs() -> Iterator[Output]:
+def _iterate_moment_outputs() -> Iterator[Output]:
     """Yield the outputs of the measure."""
-    for name, symbol, text, scale in _QUANTITIES:
-        for statistic, pattern, described in _STATISTICS:
+    for name, symbol, text, scale in _EVENT_QUANTITIES_WITH_MOMENTS:
+        for statistic, pattern, described in _MOMENT_NAMES_SYMBOLS_AND_LABELS:
             about = f"{described} of the {text}"
             math_symbol = f"${pattern.format(symbol)}$"
             size = "" if statistic == "cv" else scale
@@ -66,8 +66,8 @@ def _create_outputs() -> Iterator[Output]:
 class _Event(NamedTuple):
     """Event of a motion: time of its beginning in D_c/V_*, and static stress drop in sigma_*."""
 
-    time: float
-    stress_drop: float
+    start_time: float
+    static_stress_drop: float
 
 
 @wrap_methods_in_error_boundary
@@ -153,7 +153,7 @@ class EventStatistics(Measure):
     outputs = (
         Output("interval_count", "$n$", "1", "number of recurrence intervals"),
         Output("record_length", "", "1", "total duration of the intervals", scale="D_c/V_*"),
-        *_create_outputs(),
+        *_iterate_moment_outputs(),
     )
     #: Smallest number of intervals, below which the moments have no meaning.
     MIN_CYCLES: ClassVar[int] = 4
@@ -195,34 +195,41 @@ class EventStatistics(Measure):
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_perturbed:
             scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
-        events = self._events(scene, integrator, self.cycles)
+        events = self._list_events_delimiting_cycles(scene, integrator, self.cycles)
         checked = min(self.checked_cycles, self.cycles)
         if len(events) <= self.cycles:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
-        refined, halved = self._events(scene, integrator.refined(), checked), events
+        refined, halved = (
+            self._list_events_delimiting_cycles(scene, integrator.refined(), checked),
+            events,
+        )
         noise = scene.parts.loading_noise
         if noise.is_active:
             finer = scene.with_(noise_interval=0.5 * scene.noise_interval)
-            halved = self._events(finer, integrator, checked)
+            halved = self._list_events_delimiting_cycles(finer, integrator, checked)
         if min(len(refined), len(halved)) <= checked:
             why = "the motion settles if it is computed with other tolerances. Use a smaller rtol"
             return Outcome(Status.UNVERIFIED, message=why)
         values = {
             "interval_count": float(self.cycles),
-            "record_length": events[-1].time - events[0].time,
+            "record_length": events[-1].start_time - events[0].start_time,
         }
-        for number, (name, *_about) in enumerate(_QUANTITIES):
+        for number, (name, *_about) in enumerate(_EVENT_QUANTITIES_WITH_MOMENTS):
             found, few, fine, half = (
-                _compute_moments(_samples(part)[number])
+                _compute_moments(_compute_interval_and_drop_samples(part)[number])
                 for part in (
                     events,
                     *(part[: checked + 1] for part in (events, refined, halved)),
                 )
             )
-            stderrs = _compute_standard_errors(_samples(events)[number])
-            for i, (statistic, *_rest) in enumerate(_STATISTICS):
+            stderrs = _compute_moment_standard_errors(
+                _compute_interval_and_drop_samples(events)[number]
+            )
+            for i, (statistic, *_rest) in enumerate(_MOMENT_NAMES_SYMBOLS_AND_LABELS):
                 full, scale = f"{name}_{statistic}", found[i]
-                error = integrator.estimate_error(few[i], fine[i], _MIN_ERROR_OVER_RTOL, scale)
+                error = integrator.estimate_error(
+                    few[i], fine[i], _MIN_ESTIMATED_ERROR_OVER_RTOL, scale
+                )
                 values |= {
                     full: found[i],
                     f"{full}_error": error,
@@ -231,19 +238,23 @@ class EventStatistics(Measure):
                 }
         return Outcome(Status.OK, values)
 
-    def _events(self, scene: Scene, integrator: Integrator, cycles: int) -> list[_Event]:
+    def _list_events_delimiting_cycles(
+        self, scene: Scene, integrator: Integrator, cycle_count: int
+    ) -> list[_Event]:
         """Return the events that delimit the intervals, without the discarded events.
 
         The list is shorter than ``cycles + 1`` if the motion settles.
         """
         events = (
-            self._iterate_noisy_events(scene, integrator)
+            self._iterate_events_of_noisy_motion(scene, integrator)
             if scene.parts.loading_noise.is_active
-            else _iterate_smooth_events(scene, integrator)
+            else _iterate_events_of_noiseless_motion(scene, integrator)
         )
-        return list(islice(events, self.discarded_cycles, self.discarded_cycles + cycles + 1))
+        return list(islice(events, self.discarded_cycles, self.discarded_cycles + cycle_count + 1))
 
-    def _iterate_noisy_events(self, scene: Scene, integrator: Integrator) -> Iterator[_Event]:
+    def _iterate_events_of_noisy_motion(
+        self, scene: Scene, integrator: Integrator
+    ) -> Iterator[_Event]:
         """Yield the events of a scene with noise, detected with two levels of slip rate."""
         arrest = scene.log_load_velocity
         asked = (
@@ -253,7 +264,7 @@ class EventStatistics(Measure):
         )
         before, begun = math.nan, math.nan
         for event in integrator.follow(scene, asked, with_time=True):
-            if event.kind is EventKind.SEGMENT:
+            if event.kind is EventKind.SEGMENT_START:
                 before, begun = math.nan, math.nan
             elif event.specification == asked[0] and math.isnan(begun):
                 before = event.point.spring_stress
@@ -264,20 +275,20 @@ class EventStatistics(Measure):
                 begun = math.nan
 
 
-def _iterate_smooth_events(scene: Scene, integrator: Integrator) -> Iterator[_Event]:
+def _iterate_events_of_noiseless_motion(scene: Scene, integrator: Integrator) -> Iterator[_Event]:
     """Yield the cycles of a scene without noise as events."""
     time = 0.0
-    for cycle in iterate_cycles(scene, integrator, None):
+    for cycle in iterate_stick_slip_cycles(scene, integrator, None):
         if cycle is None:
             return
         time += cycle.recurrence_interval
-        yield _Event(time, cycle.primary_output_values()[1])
+        yield _Event(time, cycle.compute_primary_output_values()[1])
 
 
-def _samples(events: list[_Event]) -> tuple[np.ndarray, np.ndarray]:
+def _compute_interval_and_drop_samples(events: list[_Event]) -> tuple[np.ndarray, np.ndarray]:
     """Return the recurrence intervals, and the stress drop that ends each interval."""
-    intervals = [after.time - before.time for before, after in pairwise(events)]
-    return np.array(intervals), np.array([event.stress_drop for event in events[1:]])
+    intervals = [after.start_time - before.start_time for before, after in pairwise(events)]
+    return np.array(intervals), np.array([event.static_stress_drop for event in events[1:]])
 
 
 def _compute_moments(samples: np.ndarray) -> tuple[float, float, float]:
@@ -286,7 +297,7 @@ def _compute_moments(samples: np.ndarray) -> tuple[float, float, float]:
     return mean, deviation, deviation / mean
 
 
-def _compute_standard_errors(samples: np.ndarray) -> tuple[float, float, float]:
+def _compute_moment_standard_errors(samples: np.ndarray) -> tuple[float, float, float]:
     """Return the standard errors of the moments of independent samples."""
     _mean, deviation, variation = _compute_moments(samples)
     count, centred = len(samples), samples - samples.mean()

@@ -28,13 +28,13 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle_search import (
     LimitCycleSearch,
     StickSlipSequence,
-    follow_to_periodic_orbit,
+    follow_motion_to_periodic_orbit,
 )
 from rsfstudy.limit_cycles.return_map import PeriodicOrbit, ReturnMap
 from rsfstudy.limit_cycles.stick_slip_cycles import (
     LN10,
-    Cycle,
-    recorded_rows_of_cycles,
+    StickSlipCycle,
+    extract_recorded_rows_of_cycles,
     suggest_raising_event_limit,
 )
 from rsfstudy.measure_base import (
@@ -61,7 +61,7 @@ _MIN_ESTIMATED_ERROR_OVER_RTOL = 0.06
 #: Displacement of the load point that starts a motion if the scene has no step, in units of D_c.
 INITIAL_PERTURBATION_DISPLACEMENT = 0.1
 #: Number of recorded points if only the two ends of an orbit are stored.
-_MAX_CYCLE_POINTS_WITHOUT_RECORDING = 2
+_POINT_COUNT_OF_UNRECORDED_CYCLE = 2
 #: Relative accuracy of the search for the limit cycle. After the search, the orbit is refined to
 #: the requested accuracy.
 _CYCLE_SEARCH_RTOL = 1e-4
@@ -83,11 +83,11 @@ EVENTS_PER_PERIOD_OUTPUT = Output(
 #: Final behaviour of a slider. In the first two modes, the motion settles to steady sliding,
 #: without or with oscillations. In the last two modes, the motion repeats in cycles, with a peak
 #: slip rate below or above a limit.
-SLIP_MODES = ("steady", "damped_oscillation", "slow_slip", "stick_slip")
+SLIP_MODE_NAMES = ("steady", "damped_oscillation", "slow_slip", "stick_slip")
 _STEADY_CODE, _DAMPED_OSCILLATION_CODE, _SLOW_SLIP_CODE, _STICK_SLIP_CODE = map(
-    float, range(len(SLIP_MODES))
+    float, range(len(SLIP_MODE_NAMES))
 )
-_OUTPUTS = (
+_LIMIT_CYCLE_OUTPUTS = (
     *(Output(name, error=True) for name in _PRIMARY_OUTPUT_NAMES),
     Output("slip_per_event"),
     Output(
@@ -117,9 +117,9 @@ _OUTPUTS = (
         "",
         "",
         "long-term behaviour of the slider, classified by the peak slip rate",
-        flags=SLIP_MODES,
+        flags=SLIP_MODE_NAMES,
     ),
-    *create_outputs_along_phase(*Recording.MOTION_VARIABLES),
+    *create_outputs_along_phase(*Recording.MOTION_VARIABLE_NAMES),
 )
 
 
@@ -185,10 +185,10 @@ class LimitCycle(RecordingMeasure):
     events: int = 300
     name: ClassVar[str] = "limit_cycle"
     #: Values of ``slip_mode``, in the order of their codes.
-    SLIP_MODES: ClassVar = SLIP_MODES
+    SLIP_MODES: ClassVar = SLIP_MODE_NAMES
     primary_output = "recurrence_interval"
     typical_work = 9_000
-    outputs = _OUTPUTS
+    outputs = _LIMIT_CYCLE_OUTPUTS
 
     def __post_init__(self) -> None:
         """Check the fields of the measure."""
@@ -226,7 +226,7 @@ class LimitCycle(RecordingMeasure):
         for own in dict.fromkeys((integrator.loosened_to(_CYCLE_SEARCH_RTOL), integrator)):
             approach = LimitCycleSearch(scene, own)
             try:
-                found = approach.follow_until_converged(self.events)
+                found = approach.follow_cycles_until_converged(self.events)
             except MotionStopped:
                 # A search with the requested accuracy may succeed even if the search with low
                 # accuracy fails.
@@ -235,11 +235,11 @@ class LimitCycle(RecordingMeasure):
                 continue
             if found:
                 outcome = self._refine_known_periodic_orbit(
-                    scene, integrator, approach.orbit, len(approach.cycles)
+                    scene, integrator, approach.last_cycle_as_periodic_orbit, len(approach.cycles)
                 )
                 if outcome.status is not Status.UNVERIFIED:
                     return outcome
-        return outcome if found else outcome_of_settling_motion(scene)
+        return outcome if found else build_outcome_of_settling_motion(scene)
 
     def _find_multi_state_cycle(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the limit cycle of a scene with several states.
@@ -247,21 +247,21 @@ class LimitCycle(RecordingMeasure):
         The motion is integrated with a low accuracy until it approaches a periodic orbit. The orbit
         is then refined, starting from the event with the highest slip rate.
         """
-        motion = follow_to_periodic_orbit(
+        motion = follow_motion_to_periodic_orbit(
             scene,
             integrator.loosened_to(_CYCLE_SEARCH_RTOL),
             self.events,
         )
         if motion is None:
-            return outcome_of_settling_motion(scene)
-        if motion.orbit is None:
-            return outcome_of_aperiodic_motion(
+            return build_outcome_of_settling_motion(scene)
+        if motion.approached_periodic_orbit is None:
+            return build_outcome_of_aperiodic_motion(
                 scene, motion, suggest_raising_event_limit(self.events)
             )
         return self._refine_known_periodic_orbit(
             scene,
             integrator,
-            motion.orbit.orbit_starting_at_largest_event,
+            motion.approached_periodic_orbit.orbit_starting_at_largest_event,
             len(motion.cycles),
         )
 
@@ -277,13 +277,13 @@ class LimitCycle(RecordingMeasure):
         The orbit is refined again with smaller tolerances, to estimate the errors and to record the
         orbit.
         """
-        one = ReturnMap(scene, integrator).refine_orbit(orbit)
+        one = ReturnMap(scene, integrator).refine_periodic_orbit(orbit)
         fine = ReturnMap(
             scene,
             integrator.refined(),
-            recorded=self.phases > _MAX_CYCLE_POINTS_WITHOUT_RECORDING,
+            recorded=self.phases > _POINT_COUNT_OF_UNRECORDED_CYCLE,
         )
-        again = one and fine.refine_orbit(one)
+        again = one and fine.refine_periodic_orbit(one)
         if one is None or again is None:
             why = (
                 "the cycle does not close if it is computed with other tolerances. Use a "
@@ -302,17 +302,17 @@ class LimitCycle(RecordingMeasure):
             cycle.end_point.spring_stress - cycle.start_point.spring_stress
         ) / scene.stiffness
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
-        values["slip_per_event"] -= carried if one.period > 1 else 0.0
-        values |= _additional_cycle_outputs(scene, cycle)
+        values["slip_per_event"] -= carried if one.period_in_cycles > 1 else 0.0
+        values |= _compute_additional_cycle_outputs(scene, cycle)
         values["slip_mode"] = _classify_slip_mode(
             scene, LN10 * float(one.corrected_primary_outputs[INDEX_OF_PEAK_SLIP_RATE_OUTPUT])
         )
-        values["period_events"] = float(one.period)
+        values["period_events"] = float(one.period_in_cycles)
         values["events_until_repeat"] = float(max_cycles)
-        values["work_per_cycle"] = one.evaluation_count / one.period
-        status, why = status_from_output_errors(integrator, one, errors)
-        why = why or _period_of_several_events_message(one)
-        path = recorded_rows_of_cycles(scene, again.cycles, again.recording)
+        values["work_per_cycle"] = one.rhs_evaluation_count / one.period_in_cycles
+        status, why = determine_status_from_output_errors(integrator, one, errors)
+        why = why or _build_several_events_period_message(one)
+        path = extract_recorded_rows_of_cycles(scene, again.cycles, again.recording)
         return Outcome(
             status,
             values | resample_motion_along_path(path, self.phases, engine=integrator.engine),
@@ -320,13 +320,13 @@ class LimitCycle(RecordingMeasure):
         )
 
 
-def _period_of_several_events_message(orbit: PeriodicOrbit) -> str:
+def _build_several_events_period_message(orbit: PeriodicOrbit) -> str:
     """Return a message if a motion repeats only after several events."""
-    if orbit.period == 1:
+    if orbit.period_in_cycles == 1:
         return ""
     period = math.fsum(cycle.recurrence_interval for cycle in orbit.cycles)
     return (
-        f"the motion repeats itself after {orbit.period} events, with a period of {period:.6g} "
+        f"the motion repeats itself after {orbit.period_in_cycles} events, with a period of {period:.6g} "
         "D_c/V_*. The results describe the event with the highest peak slip rate, until the next "
         "maximum of the spring stress"
     )
@@ -337,7 +337,7 @@ STEADY_SLIDING_OUTCOME = Outcome(
 )
 
 
-def outcome_of_settling_motion(scene: Scene) -> Outcome:
+def build_outcome_of_settling_motion(scene: Scene) -> Outcome:
     """Return the outcome of a motion that settles to steady sliding.
 
     Parameters
@@ -368,7 +368,9 @@ def _classify_slip_mode(scene: Scene, peak_log_slip_rate: float) -> float:
     return _STICK_SLIP_CODE if peak_log_slip_rate >= limit else _SLOW_SLIP_CODE
 
 
-def outcome_of_aperiodic_motion(scene: Scene, sequence: StickSlipSequence, remedy: str) -> Outcome:
+def build_outcome_of_aperiodic_motion(
+    scene: Scene, stick_slip_sequence: StickSlipSequence, remedy: str
+) -> Outcome:
     """Return the outcome of a motion that has not reached a periodic orbit.
 
     The status depends on whether the motion may still reach a periodic orbit.
@@ -387,21 +389,21 @@ def outcome_of_aperiodic_motion(scene: Scene, sequence: StickSlipSequence, remed
     Outcome
         Outcome with the status ``work_budget_spent`` or ``not_periodic``.
     """
-    latest = sequence.cycles[len(sequence.cycles) // 2 :]
+    latest = stick_slip_sequence.cycles[len(stick_slip_sequence.cycles) // 2 :]
     peaks = [cycle.max_log_slip_rate / LN10 for cycle in latest]
     intervals = [cycle.recurrence_interval for cycle in latest]
     text = (
-        f"the last {len(latest)} of {len(sequence.cycles)} events have peak slip rates of "
+        f"the last {len(latest)} of {len(stick_slip_sequence.cycles)} events have peak slip rates of "
         f"10^{min(peaks):.4g} to 10^{max(peaks):.4g} V_* and intervals of {min(intervals):.5g} to "
         f"{max(intervals):.5g} D_c/V_*"
     )
-    if sequence.may_still_converge:
+    if stick_slip_sequence.may_still_converge:
         why = f"the motion does not repeat itself yet: {text}. {remedy}"
         return Outcome(Status.WORK_BUDGET_SPENT, message=why)
     return Outcome(Status.NOT_PERIODIC, message=text)
 
 
-def status_from_output_errors(
+def determine_status_from_output_errors(
     integrator: Integrator,
     orbit: PeriodicOrbit,
     output_errors: np.ndarray,
@@ -427,15 +429,15 @@ def status_from_output_errors(
     message : str
         Message with the largest relative error, or an empty string.
     """
-    worst = float((output_errors / _primary_output_error_scales(orbit))[outputs].max())
-    if worst <= integrator.result_tolerance(Accuracy.MAX_ERROR_OVER_RTOL):
+    worst = float((output_errors / _compute_primary_output_error_scales(orbit))[outputs].max())
+    if worst <= integrator.result_tolerance(Accuracy.MAX_RELIABLE_ERROR_OVER_RTOL):
         return Status.OK, ""
     asked = integrator.result_tolerance()
     why = f"the error of the cycle is {worst:.1e}, but {asked:g} was requested"
     return Status.UNVERIFIED, f"{why}. Use another rtol"
 
 
-def _primary_output_error_scales(orbit: PeriodicOrbit) -> list[float]:
+def _compute_primary_output_error_scales(orbit: PeriodicOrbit) -> list[float]:
     """Return the scales of the errors of the main results.
 
     The logarithm of V/V_* may be zero, so its scale is at least half of the range of the
@@ -471,7 +473,7 @@ def estimate_primary_output_errors(
     pairs = zip(
         orbit.corrected_primary_outputs.tolist(),
         refined_orbit.corrected_primary_outputs.tolist(),
-        _primary_output_error_scales(orbit),
+        _compute_primary_output_error_scales(orbit),
         strict=True,
     )
     errors = [
@@ -481,23 +483,25 @@ def estimate_primary_output_errors(
     return np.asarray(np.abs(orbit.primary_output_corrections) + np.array(errors))
 
 
-def _additional_cycle_outputs(scene: Scene, cycle: Cycle) -> dict[str, float]:
+def _compute_additional_cycle_outputs(scene: Scene, cycle: StickSlipCycle) -> dict[str, float]:
     """Return the additional results for a cycle."""
     return {
-        "healing_exponent": _healing_exponent(scene, cycle),
-        "residual_friction": cycle.friction_at_peak,
-        "drop_asymmetry": (cycle.max_spring_stress - cycle.spring_stress_at_peak)
-        / (cycle.spring_stress_at_peak - cycle.min_spring_stress),
+        "healing_exponent": _compute_healing_exponent(scene, cycle),
+        "residual_friction": cycle.friction_coefficient_at_peak_rate,
+        "drop_asymmetry": (
+            cycle.max_spring_stress_deviation - cycle.spring_stress_deviation_at_peak_rate
+        )
+        / (cycle.spring_stress_deviation_at_peak_rate - cycle.min_spring_stress_deviation),
     }
 
 
-def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
+def _compute_healing_exponent(scene: Scene, cycle: StickSlipCycle) -> float:
     """Return d ln(theta)/d ln(V) between slip arrest and the lowest slip rate.
 
     The result is NaN if the law has no state variable Theta = b ln(theta/theta_*).
     """
-    slowed = cycle.slowest_point.log_slip_rate - cycle.slip_arrest_point.log_slip_rate
+    slowed = cycle.slowest_slip_point.log_slip_rate - cycle.slip_arrest_point.log_slip_rate
     law = scene.parts.law
     if law.state_count > 1 or not law.has_logarithmic_state or not abs(slowed) > 1.0:
         return math.nan
-    return (cycle.slowest_point.state - cycle.slip_arrest_point.state) / (scene.b * slowed)
+    return (cycle.slowest_slip_point.state - cycle.slip_arrest_point.state) / (scene.b * slowed)

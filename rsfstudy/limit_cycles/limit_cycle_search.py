@@ -44,13 +44,13 @@ from rsfstudy.limit_cycles.return_map import (
     ORBIT_CLOSURE_TOLERANCE_OVER_RTOL,
     PeriodicOrbit,
     ReturnMap,
-    section_coordinates_at_point,
+    extract_section_coordinates,
 )
 from rsfstudy.limit_cycles.stick_slip_cycles import (
     LN10,
     PRIMARY_OUTPUT_COUNT_PER_CYCLE,
-    Cycle,
-    iterate_cycles,
+    StickSlipCycle,
+    iterate_stick_slip_cycles,
     suggest_raising_event_limit,
 )
 from rsfstudy.motion import Integrator, MotionStopped
@@ -77,7 +77,7 @@ _MIN_CYCLES_BEFORE_RECURRENCE_TEST = 8
 _REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
 #: Relative difference from the critical stiffness below which oscillations grow or decay so slowly
 #: that the search cannot converge.
-_CRITICAL_STIFFNESS_TOLERANCE = 1e-5
+_RTOL_OF_NEARLY_CRITICAL_STIFFNESS = 1e-5
 
 
 class LimitCycleSearch:
@@ -102,7 +102,7 @@ class LimitCycleSearch:
         self._return_map = ReturnMap(scene, integrator)
         self._noise = integrator.local_tolerance * scene.a
         self._work = 0
-        self.cycles: list[Cycle] = []
+        self.cycles: list[StickSlipCycle] = []
         #: Columns b and c of P', which are the derivatives of the image with respect to spring
         #: stress and state. The flag is True if the derivatives are known.
         self._derivatives, self._has_derivatives = (
@@ -119,7 +119,7 @@ class LimitCycleSearch:
         #: point.
         self._distance_at_leap = np.inf
 
-    def follow_until_converged(self, max_cycles: int) -> bool:
+    def follow_cycles_until_converged(self, max_cycles: int) -> bool:
         """Compute cycles until the motion reaches the limit cycle.
 
         Parameters
@@ -141,7 +141,7 @@ class LimitCycleSearch:
         start = None
         while True:
             spent = self._integrator.evaluations
-            for cycle in iterate_cycles(self._scene, self._integrator, start):
+            for cycle in iterate_stick_slip_cycles(self._scene, self._integrator, start):
                 if cycle is None:
                     return False
                 self._work, spent = (
@@ -156,7 +156,7 @@ class LimitCycleSearch:
                     remedy = suggest_raising_event_limit(max_cycles)
                     text = (
                         f"the motion does not repeat itself within {max_cycles} events"
-                        f"{self._critical_stiffness_text}. {remedy}"
+                        f"{self._nearly_critical_stiffness_message}. {remedy}"
                     )
                     raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
                 if self._should_leap_to_fixed_point():
@@ -164,19 +164,19 @@ class LimitCycleSearch:
                         cycle.end_point.spring_stress - cycle.start_point.spring_stress
                     )
                     start = self._return_map.section_coordinates_to_point(
-                        section_coordinates_at_point(cycle.start_point) + np.array(self._correction)
+                        extract_section_coordinates(cycle.start_point) + np.array(self._correction)
                     )
                     break
 
     @property
-    def _critical_stiffness_text(self) -> str:
+    def _nearly_critical_stiffness_message(self) -> str:
         """Explanation for the message if the stiffness is nearly critical.
 
         The explanation is an empty string if the stiffness is not close to critical.
         """
         critical = self._scene.critical_stiffness_at(self._scene.log_load_velocity)
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
-        if off > _CRITICAL_STIFFNESS_TOLERANCE:
+        if off > _RTOL_OF_NEARLY_CRITICAL_STIFFNESS:
             return ""
         return (
             ", because oscillations neither grow nor decay if the stiffness differs from the "
@@ -184,7 +184,7 @@ class LimitCycleSearch:
         )
 
     @property
-    def orbit(self) -> PeriodicOrbit:
+    def last_cycle_as_periodic_orbit(self) -> PeriodicOrbit:
         """Last cycle as a periodic orbit, with the remaining correction to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return PeriodicOrbit(
@@ -214,7 +214,7 @@ class LimitCycleSearch:
         last = self.cycles[-1]
         begin, end = last.start_point, last.end_point
         start = begin.spring_stress, begin.psi
-        image = [end.spring_stress, end.psi, *last.primary_output_values()]
+        image = [end.spring_stress, end.psi, *last.compute_primary_output_values()]
         changes = list(map(sub, image, self._image))
         if len(self.cycles) > 1:
             by_stress, by_state = map(sub, start, self._section)
@@ -321,12 +321,12 @@ class StickSlipSequence:
         True if the motion may still approach a periodic orbit.
     """
 
-    cycles: list[Cycle]
-    orbit: PeriodicOrbit | None
+    cycles: list[StickSlipCycle]
+    approached_periodic_orbit: PeriodicOrbit | None
     may_still_converge: bool
 
 
-def follow_to_periodic_orbit(
+def follow_motion_to_periodic_orbit(
     scene: Scene,
     integrator: Integrator,
     max_cycles: int,
@@ -351,22 +351,22 @@ def follow_to_periodic_orbit(
     StickSlipSequence or None
         Cycles and orbit, or None if the motion settles to steady sliding.
     """
-    seen, orbit, repels = list[Cycle](), None, False
+    seen, orbit, repels = list[StickSlipCycle](), None, False
     fine = integrator.tightened_to(_MAX_ORBIT_CLOSURE_RTOL)
     look = min(_MIN_CYCLES_BEFORE_RECURRENCE_TEST, max_cycles)
-    for cycle in iterate_cycles(scene, integrator, None):
+    for cycle in iterate_stick_slip_cycles(scene, integrator, None):
         if cycle is None:
             return None
         seen.append(cycle)
         if len(seen) == look and not orbit:
             look = min(2 * look, max_cycles)
             found, off = None, math.inf
-            for counted in _state_index_sets_to_compare(scene):
+            for counted in _list_state_index_sets_to_compare(scene):
                 period, off = find_recurrence_period(scene, seen, counted)
                 if off < _MAX_RECURRENCE_MISFIT:
                     by = ReturnMap(scene, fine, counted=counted)
                     found = by.find_periodic_orbit(
-                        section_coordinates_at_point(cycle.end_point),
+                        extract_section_coordinates(cycle.end_point),
                         period,
                         cycle.log_slip_rate_range,
                     )
@@ -382,7 +382,7 @@ def follow_to_periodic_orbit(
     )
 
 
-def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
+def _may_still_converge(cycles: Sequence[StickSlipCycle]) -> bool:
     """Return True if a motion may still approach a periodic orbit.
 
     The result is True for motions with few cycles. For longer motions, the result is True if the
@@ -397,7 +397,7 @@ def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
     return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
 
 
-def _state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
+def _list_state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
     """Return the sets of states for the detection of a period.
 
     The first set contains the states used for the distance from steady sliding. The second set
@@ -409,7 +409,9 @@ def _state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
 
 
 def find_recurrence_period(
-    scene: Scene, cycles: Sequence[Cycle], compared_state_indices: Sequence[int] | None = None
+    scene: Scene,
+    cycles: Sequence[StickSlipCycle],
+    compared_state_indices: Sequence[int] | None = None,
 ) -> tuple[int, float]:
     r"""Find the number of cycles after which a motion nearly repeats itself.
 

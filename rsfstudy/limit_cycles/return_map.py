@@ -46,11 +46,11 @@ from scipy.linalg.lapack import dgesv
 from rsfstudy.limit_cycles.stick_slip_cycles import (
     MIN_LOG_SLIP_RATE_RANGE,
     PRIMARY_OUTPUT_COUNT_PER_CYCLE,
-    Cycle,
-    iterate_cycles,
+    StickSlipCycle,
+    iterate_stick_slip_cycles,
 )
 from rsfstudy.motion import Accuracy, Integrator, MotionStopped, Recording
-from rsfstudy.slider import MotionPoint, Numbers, Scene
+from rsfstudy.slider import FloatTuple, MotionPoint, Scene
 from rsfstudy.status import Status
 
 #: Step of the finite differences of the return map, divided by the product of a and the range of ln
@@ -89,15 +89,15 @@ class PeriodicOrbit:
         Recording along the cycles. The recording may extend beyond the end of the cycles.
     """
 
-    cycles: tuple[Cycle, ...]
-    cycle_derivatives: tuple[np.ndarray, ...]
+    cycles: tuple[StickSlipCycle, ...]
+    return_map_derivatives_per_cycle: tuple[np.ndarray, ...]
     start_section_correction: np.ndarray
-    accuracy: Accuracy
-    evaluation_count: int
+    integration_accuracy: Accuracy
+    rhs_evaluation_count: int
     recording: Recording | None = None
 
     @property
-    def period(self) -> int:
+    def period_in_cycles(self) -> int:
         """Number of cycles in the orbit."""
         return len(self.cycles)
 
@@ -105,14 +105,14 @@ class PeriodicOrbit:
     def start_section_coordinates(self) -> np.ndarray:
         """Section at which the closed orbit begins."""
         return np.asarray(
-            section_coordinates_at_point(self.cycles[0].start_point) + self.start_section_correction
+            extract_section_coordinates(self.cycles[0].start_point) + self.start_section_correction
         )
 
     @cached_property
     def primary_output_corrections(self) -> np.ndarray:
         """Corrections of the main results for the closure error."""
         return np.asarray(
-            self.cycle_derivatives[0][len(self.start_section_correction) :]
+            self.return_map_derivatives_per_cycle[0][len(self.start_section_correction) :]
             @ self.start_section_correction
         )
 
@@ -120,15 +120,16 @@ class PeriodicOrbit:
     def corrected_primary_outputs(self) -> np.ndarray:
         """Main results of the first cycle, corrected for the closure error."""
         return np.asarray(
-            np.array(self.cycles[0].primary_output_values()) + self.primary_output_corrections
+            np.array(self.cycles[0].compute_primary_output_values())
+            + self.primary_output_corrections
         )
 
     @property
     def floquet_multipliers(self) -> np.ndarray:
         """Complex Floquet multipliers, sorted by decreasing absolute value."""
-        found = np.linalg.eigvals(multiply_cycle_derivatives(self.cycle_derivatives)).astype(
-            complex
-        )
+        found = np.linalg.eigvals(
+            multiply_return_map_derivatives(self.return_map_derivatives_per_cycle)
+        ).astype(complex)
         return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
 
     @property
@@ -139,19 +140,24 @@ class PeriodicOrbit:
     @property
     def orbit_starting_at_largest_event(self) -> PeriodicOrbit:
         """Orbit that starts with the cycle with the highest slip rate."""
-        at = max(range(self.period), key=lambda place: self.cycles[place].max_log_slip_rate)
+        at = max(
+            range(self.period_in_cycles), key=lambda place: self.cycles[place].max_log_slip_rate
+        )
         if not at:
             return self
         return replace(
             self,
             cycles=self.cycles[at:] + self.cycles[:at],
-            cycle_derivatives=self.cycle_derivatives[at:] + self.cycle_derivatives[:at],
-            start_section_correction=multiply_cycle_derivatives(self.cycle_derivatives[:at])
+            cycle_derivatives=self.return_map_derivatives_per_cycle[at:]
+            + self.return_map_derivatives_per_cycle[:at],
+            start_section_correction=multiply_return_map_derivatives(
+                self.return_map_derivatives_per_cycle[:at]
+            )
             @ self.start_section_correction,
         )
 
 
-def section_coordinates_at_point(point: MotionPoint) -> np.ndarray:
+def extract_section_coordinates(motion_point: MotionPoint) -> np.ndarray:
     """Return the section vector (spring stress and states) of a point.
 
     Parameters
@@ -164,10 +170,10 @@ def section_coordinates_at_point(point: MotionPoint) -> np.ndarray:
     ndarray, shape (1 + states,)
         Spring stress and states.
     """
-    return np.array((point.spring_stress, *point.psis))
+    return np.array((motion_point.spring_stress, *motion_point.psis))
 
 
-def section_and_outputs_at_end_of_cycle(cycle: Cycle) -> np.ndarray:
+def extract_section_and_outputs_at_cycle_end(cycle: StickSlipCycle) -> np.ndarray:
     """Return the section at the end of a cycle, and the main results of the cycle.
 
     Parameters
@@ -181,11 +187,17 @@ def section_and_outputs_at_end_of_cycle(cycle: Cycle) -> np.ndarray:
         Section at the end of the cycle, followed by the main results.
     """
     return np.array(
-        (cycle.end_point.spring_stress, *cycle.end_point.psis, *cycle.primary_output_values())
+        (
+            cycle.end_point.spring_stress,
+            *cycle.end_point.psis,
+            *cycle.compute_primary_output_values(),
+        )
     )
 
 
-def multiply_cycle_derivatives(cycle_derivatives: Sequence[np.ndarray]) -> np.ndarray:
+def multiply_return_map_derivatives(
+    return_map_derivatives_per_cycle: Sequence[np.ndarray],
+) -> np.ndarray:
     """Compute the derivative of the return map over several successive cycles.
 
     Parameters
@@ -198,14 +210,14 @@ def multiply_cycle_derivatives(cycle_derivatives: Sequence[np.ndarray]) -> np.nd
     ndarray, shape (1 + states, 1 + states)
         Product of the derivatives.
     """
-    size = cycle_derivatives[0].shape[1]
-    together = cycle_derivatives[0][:size]
-    for each in cycle_derivatives[1:]:
+    size = return_map_derivatives_per_cycle[0].shape[1]
+    together = return_map_derivatives_per_cycle[0][:size]
+    for each in return_map_derivatives_per_cycle[1:]:
         together = each[:size] @ together
     return together
 
 
-_identity_matrix = lru_cache(np.eye)
+_build_identity_matrix = lru_cache(np.eye)
 
 
 class ReturnMap:
@@ -243,7 +255,7 @@ class ReturnMap:
         #: Indices of the section components that contribute to the distance between sections.
         self._compared_unknowns = [0, *(1 + place for place in places)]
 
-    def section_coordinates_to_point(self, section: np.ndarray) -> MotionPoint:
+    def section_coordinates_to_point(self, section_coordinates: np.ndarray) -> MotionPoint:
         """Return the point of the motion at a section.
 
         The point is on the slow manifold, unless inertia is important. If inertia is important, the
@@ -264,7 +276,7 @@ class ReturnMap:
         MotionStopped
             If forward slip is impossible at this spring stress.
         """
-        spring_stress, *psis = section.tolist()
+        spring_stress, *psis = section_coordinates.tolist()
         point = Integrator.restart_point(self.scene, spring_stress, tuple(psis))
         return (
             Integrator.point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
@@ -278,7 +290,7 @@ class ReturnMap:
 
     def follow_cycles(
         self, start_section: np.ndarray, cycle_count: int, recording: Recording | None = None
-    ) -> list[Cycle]:
+    ) -> list[StickSlipCycle]:
         """Compute successive cycles from a section.
 
         Parameters
@@ -297,9 +309,9 @@ class ReturnMap:
             close to unstable steady sliding, or cannot continue. Unstable steady sliding is a fixed
             point of the map, but not a cycle.
         """
-        seen = list[Cycle]()
+        seen = list[StickSlipCycle]()
         try:
-            moving = iterate_cycles(
+            moving = iterate_stick_slip_cycles(
                 self.scene,
                 self.integrator,
                 self.section_coordinates_to_point(start_section),
@@ -316,7 +328,7 @@ class ReturnMap:
                 raise
         return seen
 
-    def follow_one_cycle(self, start_section: np.ndarray) -> np.ndarray | None:
+    def follow_one_cycle_to_next_section(self, start_section: np.ndarray) -> np.ndarray | None:
         """Compute the section one cycle later, and the main results.
 
         Parameters
@@ -330,9 +342,9 @@ class ReturnMap:
             Image of the section, or None if the motion does not complete a cycle.
         """
         seen = self.follow_cycles(start_section, 1)
-        return section_and_outputs_at_end_of_cycle(seen[0]) if seen else None
+        return extract_section_and_outputs_at_cycle_end(seen[0]) if seen else None
 
-    def compute_cycle_derivatives(
+    def compute_return_map_derivatives_per_cycle(
         self, start_section: np.ndarray, cycle_count: int, state_scale: float
     ) -> tuple[np.ndarray, ...]:
         """Compute the derivatives of successive cycles by finite differences.
@@ -360,17 +372,23 @@ class ReturnMap:
         )
         current: np.ndarray | None = start_section
         for number in range(cycle_count):
-            slopes = None if current is None else self._differentiate_cycle(current, step)
+            slopes = (
+                None
+                if current is None
+                else self._compute_return_map_derivative_of_cycle(current, step)
+            )
             if current is None or slopes is None:
                 break
             found.append(slopes)
-            after = self.follow_one_cycle(current) if number < cycle_count - 1 else None
+            after = (
+                self.follow_one_cycle_to_next_section(current) if number < cycle_count - 1 else None
+            )
             current = None if after is None else after[: len(current)]
         return tuple(found)
 
     def compute_motion_direction_and_image_change(
         self, point: MotionPoint
-    ) -> tuple[Numbers, Numbers]:
+    ) -> tuple[FloatTuple, FloatTuple]:
         """Compute the direction of the motion at a section, and its effect on the image.
 
         The effect on the image is the change in the image that results from a displacement of the
@@ -400,7 +418,7 @@ class ReturnMap:
         rest = (0.0,) * (PRIMARY_OUTPUT_COUNT_PER_CYCLE - 1)
         return (0.0, *rates[1:-1]), (*(0.0,) * (1 + states), -rates[-1], *rest)
 
-    def _differentiate_cycle(
+    def _compute_return_map_derivative_of_cycle(
         self, start_section: np.ndarray, difference_step: float
     ) -> np.ndarray | None:
         """Compute the derivatives of one cycle by fourth-order finite differences.
@@ -418,8 +436,12 @@ class ReturnMap:
                 continue
             slope = np.zeros(len(start_section) + PRIMARY_OUTPUT_COUNT_PER_CYCLE)
             for number, weight in _FINITE_DIFFERENCE_WEIGHTS:
-                ahead = self.follow_one_cycle(start_section + number * difference_step * unit)
-                behind = self.follow_one_cycle(start_section - number * difference_step * unit)
+                ahead = self.follow_one_cycle_to_next_section(
+                    start_section + number * difference_step * unit
+                )
+                behind = self.follow_one_cycle_to_next_section(
+                    start_section - number * difference_step * unit
+                )
                 if ahead is None or behind is None:
                     return None
                 slope += weight * (ahead - behind) / difference_step
@@ -454,7 +476,7 @@ class ReturnMap:
             The periodic orbit, or None if no orbit is found.
         """
         scale = self.scene.a * log_slip_rate_range
-        slopes = self.compute_cycle_derivatives(start_section, cycle_count, scale)
+        slopes = self.compute_return_map_derivatives_per_cycle(start_section, cycle_count, scale)
         found = (
             self._solve_for_closed_orbit(start_section, slopes, scale, max_distance)
             if len(slopes) == cycle_count
@@ -462,12 +484,12 @@ class ReturnMap:
         )
         if found is None:
             return None
-        cycle_count = self._cycles_until_repeat(found.cycles, scale)
+        cycle_count = self._count_cycles_until_repeat(found.cycles, scale)
         if (
             np.abs(found.start_section_coordinates - start_section).max()
             > self.integrator.result_tolerance(10.0) * scale
         ):
-            slopes = self.compute_cycle_derivatives(
+            slopes = self.compute_return_map_derivatives_per_cycle(
                 found.start_section_coordinates, cycle_count, scale
             )
         if len(slopes) < cycle_count:
@@ -476,7 +498,7 @@ class ReturnMap:
             found, cycles=found.cycles[:cycle_count], cycle_derivatives=slopes[:cycle_count]
         )
 
-    def refine_orbit(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
+    def refine_periodic_orbit(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
         """Recompute a known periodic orbit with the accuracy of this return map.
 
         Parameters
@@ -489,11 +511,11 @@ class ReturnMap:
         PeriodicOrbit or None
             The refined orbit, or None if the orbit does not close.
         """
-        if orbit.accuracy == self.integrator.accuracy:
+        if orbit.integration_accuracy == self.integrator.accuracy:
             return orbit
         return self._solve_for_closed_orbit(
             orbit.start_section_coordinates,
-            orbit.cycle_derivatives,
+            orbit.return_map_derivatives_per_cycle,
             self.scene.a * orbit.cycles[0].log_slip_rate_range,
             _MAX_ORBIT_DISTANCE,
         )
@@ -501,7 +523,7 @@ class ReturnMap:
     def _solve_for_closed_orbit(
         self,
         start_section: np.ndarray,
-        cycle_derivatives: Sequence[np.ndarray],
+        return_map_derivatives_per_cycle: Sequence[np.ndarray],
         state_scale: float,
         max_distance: float,
     ) -> PeriodicOrbit | None:
@@ -526,7 +548,8 @@ class ReturnMap:
             math.inf,
         )
         jacobian, move = (
-            multiply_cycle_derivatives(cycle_derivatives) - _identity_matrix(len(start_section)),
+            multiply_return_map_derivatives(return_map_derivatives_per_cycle)
+            - _build_identity_matrix(len(start_section)),
             None,
         )
         for _ in range(_MAX_ITERATIONS):
@@ -534,21 +557,21 @@ class ReturnMap:
                 self.integrator.evaluations,
                 Recording() if self._with_recording else None,
             )
-            seen = self.follow_cycles(at, len(cycle_derivatives), recording)
-            if len(seen) < len(cycle_derivatives):
+            seen = self.follow_cycles(at, len(return_map_derivatives_per_cycle), recording)
+            if len(seen) < len(return_map_derivatives_per_cycle):
                 return None
-            off = section_coordinates_at_point(seen[-1].end_point) - at
+            off = extract_section_coordinates(seen[-1].end_point) - at
             if move is not None:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
-            size = self._largest_scaled_section_change(move, at, state_scale)
+            size = self._compute_largest_scaled_section_change(move, at, state_scale)
             # The iteration ends at the requested accuracy, or if numerical errors of the motion
             # prevent further progress.
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
                 work = self.integrator.evaluations - spent
                 return PeriodicOrbit(
                     tuple(seen),
-                    tuple(cycle_derivatives),
+                    tuple(return_map_derivatives_per_cycle),
                     move,
                     self.integrator.accuracy,
                     work,
@@ -562,7 +585,7 @@ class ReturnMap:
                 return None
         return None
 
-    def _largest_scaled_section_change(
+    def _compute_largest_scaled_section_change(
         self, section_change: np.ndarray, section: np.ndarray, state_scale: float
     ) -> float:
         """Return the largest scaled component of a change in a section.
@@ -575,12 +598,14 @@ class ReturnMap:
         changes[first:] /= np.maximum(1.0, np.abs(section[first:]) / state_scale)
         return float(changes.max())
 
-    def _cycles_until_repeat(self, cycles: Sequence[Cycle], state_scale: float) -> int:
+    def _count_cycles_until_repeat(
+        self, cycles: Sequence[StickSlipCycle], state_scale: float
+    ) -> int:
         """Return the number of cycles after which an orbit repeats itself."""
-        begin = section_coordinates_at_point(cycles[0].start_point)
+        begin = extract_section_coordinates(cycles[0].start_point)
         for count in range(1, len(cycles)):
-            apart = self._largest_scaled_section_change(
-                section_coordinates_at_point(cycles[count - 1].end_point) - begin,
+            apart = self._compute_largest_scaled_section_change(
+                extract_section_coordinates(cycles[count - 1].end_point) - begin,
                 begin,
                 state_scale,
             )

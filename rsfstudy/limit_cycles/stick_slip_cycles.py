@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.measure_base import steady_sliding_is_linearly_stable
+from rsfstudy.measure_base import is_steady_sliding_linearly_stable
 from rsfstudy.motion import (
     Event,
     EventKind,
@@ -37,7 +37,7 @@ PRIMARY_OUTPUT_COUNT_PER_CYCLE = 5
 #: Kinds of events. They are module variables because attribute lookups would take as long as all
 #: other operations on an event.
 _START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
-_SEGMENT, _SETTLED = EventKind.SEGMENT, EventKind.SETTLED
+_SEGMENT, _SETTLED = EventKind.SEGMENT_START, EventKind.SETTLED
 _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter("spring_stress")
 
 #: Two limits. A cycle is treated as steady sliding if its range of ln V is below the first limit. A
@@ -49,7 +49,7 @@ MIN_LOG_SLIP_RATE_RANGE, _MIN_SHRINKING_CYCLES = 1e-3, 30
 _SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-6
 
 
-class Cycle(NamedTuple):
+class StickSlipCycle(NamedTuple):
     """One stick-slip cycle.
 
     Times are in units of D_c/V_*, and stresses are in units of sigma_*.
@@ -83,14 +83,14 @@ class Cycle(NamedTuple):
     """
 
     recurrence_interval: float
-    max_spring_stress: float
-    min_spring_stress: float
-    spring_stress_at_peak: float
-    friction_at_peak: float
+    max_spring_stress_deviation: float
+    min_spring_stress_deviation: float
+    spring_stress_deviation_at_peak_rate: float
+    friction_coefficient_at_peak_rate: float
     min_log_slip_rate: float
     max_log_slip_rate: float
     slip_arrest_point: MotionPoint
-    slowest_point: MotionPoint
+    slowest_slip_point: MotionPoint
     start_point: MotionPoint
     end_point: MotionPoint
 
@@ -99,7 +99,7 @@ class Cycle(NamedTuple):
         """Range of ln V during the cycle."""
         return self.max_log_slip_rate - self.min_log_slip_rate
 
-    def primary_output_values(self) -> tuple[float, ...]:
+    def compute_primary_output_values(self) -> tuple[float, ...]:
         """Return the main results of the cycle.
 
         Stress drops are measured from the spring stress at the beginning of the cycle, because the
@@ -114,7 +114,10 @@ class Cycle(NamedTuple):
             the smallest and of the largest V/V_*.
         """
         highest = self.start_point.spring_stress
-        drops = highest - self.min_spring_stress, highest - self.spring_stress_at_peak
+        drops = (
+            highest - self.min_spring_stress_deviation,
+            highest - self.spring_stress_deviation_at_peak_rate,
+        )
         return (
             self.recurrence_interval,
             *drops,
@@ -123,12 +126,12 @@ class Cycle(NamedTuple):
         )
 
 
-def iterate_cycles(
+def iterate_stick_slip_cycles(
     scene: Scene,
     integrator: Integrator,
     start_point: MotionPoint | None,
     recording: Recording | None = None,
-) -> Iterator[Cycle | None]:
+) -> Iterator[StickSlipCycle | None]:
     """Iterate over the cycles of a motion.
 
     Parameters
@@ -150,7 +153,7 @@ def iterate_cycles(
     """
     begin, begun, fallen, seen = None, 0.0, start_point is None, list[Event]()
     ahead = 0 if start_point else scene.parts.loading.reported_segment_count
-    swings, asked = list[float](), _cycle_event_specifications(scene.log_load_velocity)
+    swings, asked = list[float](), _build_cycle_event_specifications(scene.log_load_velocity)
     motion = integrator.follow(scene, asked, start=start_point, with_time=True, recording=recording)
     for event in motion:
         kind = event.kind
@@ -158,7 +161,7 @@ def iterate_cycles(
             begin, fallen, seen, ahead = None, True, [], ahead - 1
         if ahead:
             continue
-        if kind is _SETTLED and steady_sliding_is_linearly_stable(scene):
+        if kind is _SETTLED and is_steady_sliding_linearly_stable(scene):
             yield None
             return
         if kind is _START and start_point is not None:
@@ -168,12 +171,12 @@ def iterate_cycles(
         if kind is not _RISE or not fallen:
             continue
         if begin is not None:
-            cycle = _cycle_from_events(begin, begun, seen)
+            cycle = _build_cycle_from_events(begin, begun, seen)
             swings.append(cycle.log_slip_rate_range)
             if (
                 swings[-1] < MIN_LOG_SLIP_RATE_RANGE
                 or _are_log_rate_ranges_approaching_zero(swings)
-            ) and steady_sliding_is_linearly_stable(scene):
+            ) and is_steady_sliding_linearly_stable(scene):
                 yield None
                 return
             yield cycle
@@ -198,8 +201,8 @@ def suggest_raising_event_limit(event_count: int, option_name: str = "events") -
     return f"To compute more events, pass --set {option_name}={2 * event_count} ({option_name}=)"
 
 
-def recorded_rows_of_cycles(
-    scene: Scene, cycles: Sequence[Cycle], recording: Recording | None
+def extract_recorded_rows_of_cycles(
+    scene: Scene, cycles: Sequence[StickSlipCycle], recording: Recording | None
 ) -> np.ndarray:
     """Return the recorded samples of successive cycles.
 
@@ -229,21 +232,21 @@ def recorded_rows_of_cycles(
     slip = (
         scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
     )
-    last = Recording.row_at_point(scene, passed, slip, end, 0)
+    last = Recording.convert_point_to_row(scene, passed, slip, end, 0)
     if recording is None:
-        return np.stack([Recording.row_at_point(scene, 0.0, 0.0, begin, 0), last])
+        return np.stack([Recording.convert_point_to_row(scene, 0.0, 0.0, begin, 0), last])
     # The last integration step extends beyond the end of the last cycle.
-    return recording.table_up_to_row(scene, last)
+    return recording.as_table_up_to_row(scene, last)
 
 
 @lru_cache(maxsize=256)
-def _cycle_event_specifications(log_load_velocity: float) -> tuple[EventSpecification, ...]:
+def _build_cycle_event_specifications(log_load_velocity: float) -> tuple[EventSpecification, ...]:
     """Return the events that delimit the cycles at ln(V_0/V_*)."""
     return (
-        maximum("log_slip_rate", may_defer=True),
-        minimum("log_slip_rate", may_defer=True),
+        maximum("log_slip_rate", may_report_later=True),
+        minimum("log_slip_rate", may_report_later=True),
         rise("log_slip_rate", log_load_velocity),
-        fall("log_slip_rate", log_load_velocity, may_defer=True),
+        fall("log_slip_rate", log_load_velocity, may_report_later=True),
         approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE),
     )
 
@@ -267,28 +270,28 @@ def _are_log_rate_ranges_approaching_zero(log_slip_rate_ranges: list[float]) -> 
     return log_slip_rate_ranges[-1] - still_to_come < 0.1 * log_slip_rate_ranges[-1]
 
 
-def _cycle_from_events(
+def _build_cycle_from_events(
     start_point: MotionPoint, start_time: float, events: Sequence[Event]
-) -> Cycle:
+) -> StickSlipCycle:
     """Assemble the cycle that ends with the last event."""
     points, end = [event.point for event in events], events[-1]
     fastest, rested = max(points, key=_get_log_slip_rate), min(points, key=_get_log_slip_rate)
-    return Cycle(
+    return StickSlipCycle(
         recurrence_interval=end.time - start_time,
-        max_spring_stress=end.point.spring_stress,
-        min_spring_stress=min(map(_get_spring_stress, points)),
-        spring_stress_at_peak=fastest.spring_stress,
-        friction_at_peak=fastest.friction_coefficient,
+        max_spring_stress_deviation=end.point.spring_stress,
+        min_spring_stress_deviation=min(map(_get_spring_stress, points)),
+        spring_stress_deviation_at_peak_rate=fastest.spring_stress,
+        friction_coefficient_at_peak_rate=fastest.friction_coefficient,
         min_log_slip_rate=rested.log_slip_rate,
         max_log_slip_rate=fastest.log_slip_rate,
-        slip_arrest_point=_find_arrest_point(events) or rested,
-        slowest_point=rested,
+        slip_arrest_point=_find_slip_arrest_point(events) or rested,
+        slowest_slip_point=rested,
         start_point=start_point,
         end_point=end.point,
     )
 
 
-def _find_arrest_point(events: Sequence[Event]) -> MotionPoint | None:
+def _find_slip_arrest_point(events: Sequence[Event]) -> MotionPoint | None:
     """Return the point at which friction balances the spring after rupture.
 
     The result is None if the cycle has no such point.

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from rsfstudy.measure_base._declaration_checks import OutputValue
     from rsfstudy.measure_base._loading_checks import (
         check_loading_changes_stress_only_in_steps,
-        refuse_noise,
+        check_loading_has_no_noise,
     )
     from rsfstudy.measure_base._recorded_motion import RecordingMeasure, create_outputs_along_phase
     from rsfstudy.measure_base.elasticities import Elasticities
     from rsfstudy.measure_base.measure import Measure, Outcome
-    from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
+    from rsfstudy.measure_base.settling_checks import is_steady_sliding_linearly_stable
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -46,6 +46,6 @@ __all__ = [
     "RecordingMeasure",
     "check_loading_changes_stress_only_in_steps",
     "create_outputs_along_phase",
-    "refuse_noise",
-    "steady_sliding_is_linearly_stable",
+    "check_loading_has_no_noise",
+    "is_steady_sliding_linearly_stable",
 ]

@@ -74,7 +74,7 @@ def check_measure_description(
         raise InvalidValue("name", name, "must be a string").with_location("measure")
 
 
-def check_coordinate_values(name: str, values: Any) -> None:
+def check_coordinate_values(dimension_name: str, coordinate_values: Any) -> None:
     """Check the coordinate values of an inner dimension.
 
     Parameters
@@ -90,9 +90,9 @@ def check_coordinate_values(name: str, values: Any) -> None:
         If the values are not one-dimensional, not finite or not unique, or if a file could not
         store them.
     """
-    array = np.asarray(values)
-    if isinstance(values, np.ma.MaskedArray) or array.ndim != 1 or not array.size:
-        raise InvalidValue(name, values, "must be a list of coordinate values")
+    array = np.asarray(coordinate_values)
+    if isinstance(coordinate_values, np.ma.MaskedArray) or array.ndim != 1 or not array.size:
+        raise InvalidValue(dimension_name, coordinate_values, "must be a list of coordinate values")
     texts = array.dtype.kind in "OU" and all(isinstance(text, str) for text in array)
     # NetCDF has no half-precision and no extended-precision floats.
     numbers = array.dtype.kind in "iufb" and array.dtype.char not in "eg"
@@ -100,12 +100,14 @@ def check_coordinate_values(name: str, values: Any) -> None:
         texts = "\0" not in "".join(array).encode().decode()
     if not texts and not (numbers and np.isfinite(array).all()):
         raise InvalidValue(
-            name, values, "must contain finite numbers or strings, because it is an inner dimension"
+            dimension_name,
+            coordinate_values,
+            "must contain finite numbers or strings, because it is an inner dimension",
         )
     if len(set(array.tolist())) < array.size:
         raise InvalidValue(
-            name,
-            values,
+            dimension_name,
+            coordinate_values,
             "must contain different values, because it is an inner dimension",
         )
 

@@ -6,7 +6,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import Scene
 
 
-def refuse_noise(scene: Scene) -> None:
+def check_loading_has_no_noise(scene: Scene) -> None:
     """Check that the loading of a scene has no noise.
 
     Parameters
@@ -42,7 +42,7 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
         If the load point velocity or the normal stress changes continuously, or if the scene has
         noise.
     """
-    refuse_noise(scene)
+    check_loading_has_no_noise(scene)
     loading = scene.parts.loading
     if loading.unknowns:
         what = "load point velocity" if loading.has_load_point_unknown else "normal stress"

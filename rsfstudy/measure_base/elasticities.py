@@ -26,7 +26,7 @@ NUMERIC_SCENE_FIELDS = tuple(
 #: Scene fields of shear heating, thermal pressurisation and flash heating. By default,
 #: ``parameters`` does not contain these fields, so that the results of scenes without heating do
 #: not change.
-_FIELDS_OF_HEAT = frozenset(
+_HEATING_FIELDS_EXCLUDED_BY_DEFAULT = frozenset(
     {
         "heating", "cooling", "direct_activation", "evolution_activation", "pressurisation",
         "weakening_velocity_ratio", "weakened_friction", "weakening_exponent",
@@ -160,7 +160,11 @@ class Elasticities(Measure):
             self,
             "parameters",
             tuple(self.parameters)
-            or tuple(n for n in self._differentiable_parameter_names if n not in _FIELDS_OF_HEAT),
+            or tuple(
+                n
+                for n in self._differentiable_parameter_names
+                if n not in _HEATING_FIELDS_EXCLUDED_BY_DEFAULT
+            ),
         )
         for name in self.parameters:
             if name not in self._differentiable_parameter_names:
@@ -258,7 +262,7 @@ class Elasticities(Measure):
             return Outcome(outcome.status, message=outcome.message)
         names = self.primary_output, f"{self.primary_output}_error"
         values: dict[str, OutputValue] = {name: outcome.values.get(name, 0.0) for name in names}
-        here = self._log_of_primary_output(outcome)
+        here = self._compute_log_of_primary_output(outcome)
         if here is None:
             why = f"{self.primary_output} is zero, so its logarithm does not exist"
             return Outcome(Status.NOT_APPLICABLE, values, why)
@@ -326,7 +330,7 @@ class Elasticities(Measure):
                 if not found:
                     raise
                 break  # Some evaluations near the end of a solution branch exceed the budget.
-            slope, error, of_levels = _central_difference(central_value, sides, size)
+            slope, error, of_levels = _compute_central_difference(central_value, sides, size)
             if found and not all(sides):
                 # The truncation error of the previous step is eight times as large.
                 error += 2.0 * abs(slope - found[-1][2])
@@ -377,9 +381,9 @@ class Elasticities(Measure):
         if not outcome.status.is_answer:
             where = f"at {parameter_name} = {getattr(beside, parameter_name):.9g}"
             raise MotionStopped(outcome.status, f"{where}: {outcome.message}")
-        return self._log_of_primary_output(outcome)
+        return self._compute_log_of_primary_output(outcome)
 
-    def _log_of_primary_output(self, outcome: Outcome) -> _LogValueWithError | None:
+    def _compute_log_of_primary_output(self, outcome: Outcome) -> _LogValueWithError | None:
         """Return ``ln|y|`` of an outcome, and its error including the rounding error.
 
         Returns
@@ -399,7 +403,7 @@ class Elasticities(Measure):
         )
 
 
-def _central_difference(
+def _compute_central_difference(
     central_value: _LogValueWithError,
     neighbouring_values: Sequence[_LogValueWithError | None],
     log_step: float,

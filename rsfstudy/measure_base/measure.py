@@ -30,9 +30,9 @@ from rsfstudy.motion import (
     Integrator,
     MotionStopped,
     WorkMeter,
-    accept_accuracy_and_meter,
+    accept_former_accuracy_and_meter,
 )
-from rsfstudy.quantities import Output, Quantity, is_variable_name
+from rsfstudy.quantities import Output, Quantity, is_valid_variable_name
 from rsfstudy.slider import Scene, SceneFields, cached_attribute
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
@@ -148,7 +148,7 @@ class Measure(ConstructorKeywordCheckMixin):
         """Adopt former names of members that the subclass defines."""
         super().__init_subclass__()
         add_new_names_for_former_members(cls)
-        accept_accuracy_and_meter(cls)
+        accept_former_accuracy_and_meter(cls)
 
     @property
     def primary_output(self) -> str:
@@ -243,7 +243,7 @@ class Measure(ConstructorKeywordCheckMixin):
         float
             The typical number of evaluations, scaled to the accuracy.
         """
-        return self.typical_work * relative_work_at_accuracy(accuracy, self.work_by_digits)
+        return self.typical_work * compute_relative_work_at_accuracy(accuracy, self.work_by_digits)
 
     @property
     def plain_fields(self) -> dict[str, PlainValue]:
@@ -383,10 +383,10 @@ class Measure(ConstructorKeywordCheckMixin):
         """
         outcome, meter = self.run_metered(scene, accuracy)
         if outcome.status is Status.WORK_BUDGET_SPENT and meter.evaluations > meter.budget:
-            return replace(outcome, message=outcome.message + meter.budget_advice)
+            return replace(outcome, message=outcome.message + meter.larger_budget_advice)
         return outcome
 
-    @accept_accuracy_and_meter
+    @accept_former_accuracy_and_meter
     def run_nested(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the results for use in another measure.
 
@@ -501,7 +501,7 @@ class Measure(ConstructorKeywordCheckMixin):
         values, doubts = outcome.values, []
         for name, scale in self.error_scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), integrator.result_tolerance() * scale
-            if error > Accuracy.MAX_ERROR_OVER_RTOL * asked:
+            if error > Accuracy.MAX_RELIABLE_ERROR_OVER_RTOL * asked:
                 text = (
                     f"{name} = {values[name]:.6g} has an error estimate of {error:.2g}, but "
                     f"{asked:.2g}"
@@ -565,7 +565,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
         )
     for name in names:
         kind, rule = "variable", ""
-        if not is_variable_name(name):
+        if not is_valid_variable_name(name):
             kind, rule = "variable name", "must be a Python identifier in normalisation form NFC"
         elif name in RESERVED_NAMES - {*measure.solved_fields}:
             rule = "has a reserved name"
@@ -599,7 +599,9 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             )
 
 
-def relative_work_at_accuracy(accuracy: Accuracy, work_by_digits: Mapping[float, float]) -> float:
+def compute_relative_work_at_accuracy(
+    accuracy: Accuracy, work_by_digits: Mapping[float, float]
+) -> float:
     """Return the cost at a requested accuracy, relative to the default accuracy.
 
     The function interpolates costs that were measured for several numbers of digits.

@@ -7,7 +7,7 @@ from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 
-def steady_sliding_is_linearly_stable(scene: Scene) -> bool:
+def is_steady_sliding_linearly_stable(scene: Scene) -> bool:
     """Return True if steady sliding at the load point velocity is stable.
 
     Parameters
@@ -34,7 +34,7 @@ def steady_sliding_is_linearly_stable(scene: Scene) -> bool:
         raise MotionStopped(
             Status.UNVERIFIED,
             "the motion approaches steady sliding, but it is undecided whether it settles, "
-            f"because the growth rate of small perturbations is {growth.value:.1e} per D_c of "
-            f"slip with an error of {growth.error:.1e}. Use a slightly different stiffness=.",
+            f"because the growth rate of small perturbations is {growth.real_part:.1e} per D_c of "
+            f"slip with an error of {growth.error_estimate:.1e}. Use a slightly different stiffness=.",
         )
-    return growth.value < 0.0
+    return growth.real_part < 0.0

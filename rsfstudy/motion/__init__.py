@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         rise,
     )
     from rsfstudy.motion.former_arguments import (
-        accept_accuracy_and_meter,
+        accept_former_accuracy_and_meter,
     )
     from rsfstudy.motion.integrator import Integrator
     from rsfstudy.motion.motion_driver import MotionDriver
@@ -94,7 +94,7 @@ __all__ = [
     "MotionStopped",
     "Recording",
     "WorkMeter",
-    "accept_accuracy_and_meter",
+    "accept_former_accuracy_and_meter",
     "approach_to_steady_state",
     "build_root_finder",
     "estimate_error",

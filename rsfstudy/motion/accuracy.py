@@ -11,7 +11,7 @@ from typing import ClassVar
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion.engines import SCIPY, engine_name
+from rsfstudy.motion.engines import SCIPY, resolve_engine_name
 
 #: Default value and limits of the relative tolerance ``Accuracy.rtol``.
 DEFAULT_RTOL = 1e-7
@@ -23,10 +23,10 @@ MAX_EVALUATION_BUDGET = 10**15
 #: Upper limit of ``rtol`` in the formulas for the slow-manifold thresholds. The slow-manifold
 #: approximation, a series in the inertia weight, changes ln V by at most 0.08. A motion would never
 #: reach a larger threshold of this change.
-_MAX_REGIME_SWITCHING_RTOL = 2e-5
+_LARGEST_RTOL_IN_REGIME_THRESHOLDS = 2e-5
 #: Maximum ratio of an error estimate to ``rtol``. If this ratio is exceeded, the difference between
 #: two runs is not a reliable error estimate.
-MAX_ERROR_OVER_RTOL = 100.0
+MAX_RELIABLE_ERROR_OVER_RTOL = 100.0
 #: Relative rounding error that each error estimate includes.
 RELATIVE_ROUNDING_ERROR = 1e-13
 
@@ -80,7 +80,7 @@ class Accuracy:
     #: Default value of ``budget``.
     DEFAULT_BUDGET: ClassVar = DEFAULT_EVALUATION_BUDGET
     #: Maximum ratio of a reliable error estimate to ``rtol``.
-    MAX_ERROR_OVER_RTOL: ClassVar = MAX_ERROR_OVER_RTOL
+    MAX_RELIABLE_ERROR_OVER_RTOL: ClassVar = MAX_RELIABLE_ERROR_OVER_RTOL
     #: Relative rounding error that each error estimate includes.
     RELATIVE_ROUNDING_ERROR: ClassVar = RELATIVE_ROUNDING_ERROR
 
@@ -107,7 +107,7 @@ class Accuracy:
             rule = f"must be a whole number from 1 to {MAX_EVALUATION_BUDGET:,}"
             raise InvalidValue("budget", self.budget, rule)
         object.__setattr__(self, "budget", int(self.budget))
-        object.__setattr__(self, "engine", engine_name(self.engine))
+        object.__setattr__(self, "engine", resolve_engine_name(self.engine))
         if self.methods and self.engine != SCIPY:
             rule = f"must be empty if the engine is {self.engine!r}"
             raise InvalidValue(
@@ -130,7 +130,7 @@ class Accuracy:
         The errors of the two runs differ by about a factor of ten, so the difference between the
         results estimates the error of the first run. The runs share no intermediate results.
         """
-        return _cached_copy_with_tolerances(self, self.rtol, 0.1 * self.refinement)
+        return _copy_accuracy_with_tolerances(self, self.rtol, 0.1 * self.refinement)
 
     def with_rtol(self, rtol: float) -> Accuracy:
         """Return a copy of the settings with a different relative error tolerance.
@@ -145,7 +145,7 @@ class Accuracy:
         Accuracy
             Accuracy settings with the new tolerance. All other settings are unchanged.
         """
-        return _cached_copy_with_tolerances(self, rtol, self.refinement)
+        return _copy_accuracy_with_tolerances(self, rtol, self.refinement)
 
     @property
     def digits(self) -> float:
@@ -162,7 +162,7 @@ class Accuracy:
         return 0.07 * self.rtol * self.refinement
 
     @property
-    def max_inertia_weight(self) -> float:
+    def max_inertia_weight_on_slow_manifold(self) -> float:
         """Maximum inertia weight :math:`(K/a) w^2` on the slow manifold.
 
         The slow-manifold approximation is of second order in the inertia weight :math:`W`. If the
@@ -170,10 +170,12 @@ class Accuracy:
         In random scenes, the error of the stress drop is up to :math:`0.4 W^3`. The test suite
         measures the factor 1.6.
         """
-        return math.cbrt(0.75 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
+        return math.cbrt(
+            0.75 * min(self.rtol, _LARGEST_RTOL_IN_REGIME_THRESHOLDS) * self.refinement
+        )
 
     @property
-    def max_inertia_correction(self) -> float:
+    def max_log_rate_change_by_inertia(self) -> float:
         """Maximum change in ln V due to inertia on the slow manifold.
 
         If friction weakens strongly with slip, a motion exceeds this limit before it exceeds the
@@ -181,16 +183,18 @@ class Accuracy:
         limit cycle is up to :math:`0.07 d^3` in random scenes, and :math:`0.0014 d^3` for the
         slider of the published study. The test suite measures both coefficients.
         """
-        return math.cbrt(15.0 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
+        return math.cbrt(
+            15.0 * min(self.rtol, _LARGEST_RTOL_IN_REGIME_THRESHOLDS) * self.refinement
+        )
 
     @property
-    def max_remaining_slip(self) -> float:
+    def max_slip_in_return_to_slow_manifold(self) -> float:
         """Maximum slip in D_c during a transition to the slow manifold."""
         return 0.3 * self.rtol * self.refinement
 
 
 @lru_cache(maxsize=256)
-def _cached_copy_with_tolerances(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
+def _copy_accuracy_with_tolerances(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
     """Return a copy of the accuracy settings with different tolerances.
 
     The copy is cached, so all computations of a study share the same object.

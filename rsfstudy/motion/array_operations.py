@@ -29,7 +29,7 @@ def evaluate_function_into_array(function, y, rates, parameters, result):
         return  # The function has filled its results with NaN before it evaluated the equations.
 
 
-def array_as_pointer(array):
+def convert_array_to_pointer(array):
     """Convert an array to an argument of ``advance_pointer_by_items``.
 
     Parameters

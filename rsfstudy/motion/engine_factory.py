@@ -11,11 +11,11 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import engines
 from rsfstudy.motion.engines import (
     COMPILED,
-    ENGINES,
+    ENGINE_NAMES,
     PYTHON,
     SCIPY,
+    build_unknown_engine_error,
     find_user_stepper,
-    unknown_engine_error,
 )
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ def check_engine_is_usable(name: str) -> None:
     InvalidValue
         If the engine is unknown, or if it is the compiled engine and Numba is not installed.
     """
-    if name not in ENGINES and not find_user_stepper(name):
-        raise unknown_engine_error(name)
+    if name not in ENGINE_NAMES and not find_user_stepper(name):
+        raise build_unknown_engine_error(name)
     if name == COMPILED:
         import_compiled_engine()
 
@@ -68,16 +68,16 @@ def create_stepper(
     """
     if engine_name == COMPILED:
         return 0
-    stepper = _stepper_classes_by_engine().get(engine_name) or next(
+    stepper = _import_stepper_classes_by_engine().get(engine_name) or next(
         iter(find_user_stepper(engine_name)), None
     )
     if stepper is None:
-        raise unknown_engine_error(engine_name)
+        raise build_unknown_engine_error(engine_name)
     return stepper(tuple(equations_by_regime), method_by_regime)
 
 
 @cache
-def _stepper_classes_by_engine() -> dict[str, Any]:
+def _import_stepper_classes_by_engine() -> dict[str, Any]:
     """Return the stepper classes of the SciPy and Python engines."""
     order_eight = importlib.import_module("rsfstudy.motion.steppers.order_eight")
     scipy = importlib.import_module("rsfstudy.motion.steppers.scipy")
@@ -106,7 +106,7 @@ def import_compiled_engine() -> Any:
         raise InvalidValue("engine", COMPILED, rule, remedy=remedy) from error
 
 
-def call_array_function_by_engine(
+def call_array_function_with_engine(
     function: Callable[..., None], engine_name: str, *arrays: np.ndarray
 ) -> None:
     """Call an array function. The compiled engine compiles the function first.
@@ -131,14 +131,14 @@ def call_array_function_by_engine(
 class Engine:
     """Names of the engines, and functions that find, check and compile engines."""
 
-    SCIPY, PYTHON, COMPILED = engines.ENGINES
+    SCIPY, PYTHON, COMPILED = engines.ENGINE_NAMES
     #: Names of the engines of the package, without user-defined steppers.
-    NAMES = engines.ENGINES
+    NAMES = engines.ENGINE_NAMES
     #: Record of the compilations in this process.
     compilation_log = engines.compilation_log
 
     is_installed = staticmethod(engines.is_engine_installed)
     check_is_usable = staticmethod(check_engine_is_usable)
-    import_compiled = staticmethod(import_compiled_engine)
+    import_compiled_engine = staticmethod(import_compiled_engine)
     find_user_stepper = staticmethod(find_user_stepper)
     register_user_steppers = staticmethod(engines.register_user_steppers)

@@ -15,15 +15,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantities import is_variable_name
+from rsfstudy.quantities import is_valid_variable_name
 
 SCIPY, PYTHON, COMPILED = "scipy", "python", "compiled"
-ENGINES = (SCIPY, PYTHON, COMPILED)
+ENGINE_NAMES = (SCIPY, PYTHON, COMPILED)
 #: User-defined steppers that are registered in this process.
 _USER_STEPPER_CLASS_BY_NAME: dict[str, type] = {}
 
 
-def engine_name(engine: Any) -> str:
+def resolve_engine_name(engine: Any) -> str:
     """Return the name of an engine, and register user-defined steppers.
 
     Parameters
@@ -44,19 +44,23 @@ def engine_name(engine: Any) -> str:
         no valid name, or has the name of another engine.
     """
     if not isinstance(engine, type):
-        if not isinstance(engine, str) or not (engine in ENGINES or is_variable_name(engine)):
-            raise unknown_engine_error(engine)
+        if not isinstance(engine, str) or not (
+            engine in ENGINE_NAMES or is_valid_variable_name(engine)
+        ):
+            raise build_unknown_engine_error(engine)
         return engine
     base = importlib.import_module("rsfstudy.motion.steppers").Stepper
     name: Any = getattr(engine, "name", None)
     if not issubclass(engine, base):
         remedy = f"Derive a class from {base.__module__}.{base.__name__}."
         raise InvalidValue("engine", engine, "is not a subclass of Stepper", remedy=remedy)
-    if not isinstance(name, str) or not is_variable_name(name):
+    if not isinstance(name, str) or not is_valid_variable_name(name):
         rule = f"must have a Python identifier as its name (got {name!r})"
         raise InvalidValue("engine", engine, rule, remedy='Write name = "..." in its class.')
     known = _USER_STEPPER_CLASS_BY_NAME.get(name, engine)
-    if name in ENGINES or _qualified_name_of_stepper(known) != _qualified_name_of_stepper(engine):
+    if name in ENGINE_NAMES or _get_module_and_name_of_stepper(
+        known
+    ) != _get_module_and_name_of_stepper(engine):
         rule = f"has the name {name!r}, which another engine already has"
         raise InvalidValue("engine", engine, rule, remedy="Choose another name.")
     _USER_STEPPER_CLASS_BY_NAME[name] = engine
@@ -98,7 +102,7 @@ def register_user_steppers(steppers: Iterable[type]) -> None:
         _USER_STEPPER_CLASS_BY_NAME[stepper.name] = stepper  # type: ignore[attr-defined]
 
 
-def _qualified_name_of_stepper(stepper: type) -> tuple[str, str]:
+def _get_module_and_name_of_stepper(stepper: type) -> tuple[str, str]:
     """Return the module and the name of a stepper class.
 
     The module and the name do not change if a class is defined again, for example in a notebook.
@@ -106,7 +110,7 @@ def _qualified_name_of_stepper(stepper: type) -> tuple[str, str]:
     return stepper.__module__, stepper.__qualname__
 
 
-def unknown_engine_error(engine: Any) -> InvalidValue:
+def build_unknown_engine_error(engine: Any) -> InvalidValue:
     """Return the error for a name or class that is not an engine.
 
     Parameters
@@ -120,7 +124,7 @@ def unknown_engine_error(engine: Any) -> InvalidValue:
         Error with the allowed choices.
     """
     return InvalidValue(
-        "engine", engine, "is unknown", choices=(*ENGINES, *_USER_STEPPER_CLASS_BY_NAME)
+        "engine", engine, "is unknown", choices=(*ENGINE_NAMES, *_USER_STEPPER_CLASS_BY_NAME)
     )
 
 
@@ -144,9 +148,7 @@ class CompilationLog:
 
     compiled_program_count: int = 0
     total_compilation_seconds: float = 0.0
-    create_context_while_compiling: Callable[[], AbstractContextManager[None]] = (
-        contextlib.nullcontext
-    )
+    create_compilation_context: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
 
 
 compilation_log = CompilationLog()

@@ -10,9 +10,9 @@ import numpy as np
 from rsfstudy.motion import array_layout
 from rsfstudy.motion.events import EventKind, EventSpecification
 from rsfstudy.motion.step_events import BEFORE_JUMP, NO_EVENT, find_jump_side_of_event
-from rsfstudy.slider import MotionPoint, Numbers
+from rsfstudy.slider import FloatTuple, MotionPoint
 
-_EVENT_KIND_CODES = {
+_CODE_BY_EVENT_KIND = {
     kind: array_layout.__dict__[kind.name]
     for kind in EventKind
     if kind.name in array_layout.__dict__
@@ -26,10 +26,10 @@ _POINT_COLUMN_BY_QUANTITY = {
 _KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
     (k, None)
     for k in (
-        EventKind.SEGMENT,
-        EventKind.SAMPLED,
+        EventKind.SEGMENT_START,
+        EventKind.ALL_SAMPLES_RECORDED,
         EventKind.END,
-        EventKind.REGIME,
+        EventKind.REGIME_CHANGE,
         EventKind.START,
     )
 ]
@@ -37,9 +37,9 @@ _KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
 
 def find_events_at_jump(
     point_before: MotionPoint,
-    parameters_before: Numbers,
+    parameters_before: FloatTuple,
     point_after: MotionPoint,
-    parameters_after: Numbers,
+    parameters_after: FloatTuple,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[tuple[EventSpecification, MotionPoint]]:
     """Yield the requested events that occur at a jump between two points.
@@ -60,9 +60,12 @@ def find_events_at_jump(
     point : MotionPoint
         Point at which the event is reported, either ``point_before`` or ``point_after``.
     """
-    last, first = pack_point(point_before).tolist(), pack_point(point_after).tolist()
+    last, first = (
+        pack_point_into_array(point_before).tolist(),
+        pack_point_into_array(point_after).tolist(),
+    )
     table = (
-        pack_event_specifications(tuple(event_specs))[0]
+        pack_event_specifications_into_table(tuple(event_specs))[0]
         .reshape(-1, len(array_layout.EVENT_SPECIFICATION_COLUMNS))
         .tolist()
     )
@@ -73,7 +76,7 @@ def find_events_at_jump(
 
 
 @lru_cache(maxsize=256)
-def pack_event_specifications(
+def pack_event_specifications_into_table(
     event_specs: tuple[EventSpecification, ...],
 ) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
     """Convert event specifications to the table of the event loop.
@@ -97,15 +100,15 @@ def pack_event_specifications(
     asked = np.zeros((len(event_specs), len(array_layout.EVENT_SPECIFICATION_COLUMNS)))
     for row, spec in zip(asked, event_specs, strict=True):
         row[array_layout.SPEC_KIND], row[array_layout.SPEC_QUANTITY] = (
-            _EVENT_KIND_CODES[spec.kind],
+            _CODE_BY_EVENT_KIND[spec.kind],
             _POINT_COLUMN_BY_QUANTITY[spec.quantity],
         )
         row[array_layout.SPEC_LEVEL], row[array_layout.SPEC_TERMINAL] = spec.level, spec.terminal
-        row[array_layout.SPEC_MAY_DEFER] = spec.may_defer
+        row[array_layout.SPEC_MAY_REPORT_LATER] = spec.may_report_later
     return asked.ravel(), meanings
 
 
-def pack_point(point: MotionPoint) -> np.ndarray:
+def pack_point_into_array(point: MotionPoint) -> np.ndarray:
     """Convert a ``MotionPoint`` to an array with the columns of the event loop.
 
     Parameters

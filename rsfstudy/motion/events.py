@@ -53,9 +53,9 @@ class EventKind(StrEnum):
     RISE = "rise"
     FALL = "fall"
     SETTLED = "settled"
-    REGIME = "regime"
-    SEGMENT = "segment"
-    SAMPLED = "sampled"
+    REGIME_CHANGE = "regime"
+    SEGMENT_START = "segment"
+    ALL_SAMPLES_RECORDED = "sampled"
     END = "end"
 
     # The hash function of enumerations is slow because it is written in Python.
@@ -89,12 +89,12 @@ class EventSpecification(NamedTuple):
     quantity: str = ""
     level: float = 0.0
     terminal: bool = False
-    may_defer: bool = False
+    may_report_later: bool = False
 
 
 @accept_former_keyword_names
 def maximum(
-    quantity: str, *, terminal: bool = False, may_defer: bool = False
+    quantity: str, *, terminal: bool = False, may_report_later: bool = False
 ) -> EventSpecification:
     """Create an event specification for the maxima of a quantity.
 
@@ -114,13 +114,13 @@ def maximum(
         Specification of the event.
     """
     return _specify_quantity_event(
-        EventKind.MAXIMUM, quantity, terminal=terminal, may_defer=may_defer
+        EventKind.MAXIMUM, quantity, terminal=terminal, may_report_later=may_report_later
     )
 
 
 @accept_former_keyword_names
 def minimum(
-    quantity: str, *, terminal: bool = False, may_defer: bool = False
+    quantity: str, *, terminal: bool = False, may_report_later: bool = False
 ) -> EventSpecification:
     """Create an event specification for the minima of a quantity.
 
@@ -140,13 +140,13 @@ def minimum(
         Specification of the event.
     """
     return _specify_quantity_event(
-        EventKind.MINIMUM, quantity, terminal=terminal, may_defer=may_defer
+        EventKind.MINIMUM, quantity, terminal=terminal, may_report_later=may_report_later
     )
 
 
 @accept_former_keyword_names
 def rise(
-    quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
+    quantity: str, level: float, *, terminal: bool = False, may_report_later: bool = False
 ) -> EventSpecification:
     """Create an event specification for upward crossings of a level.
 
@@ -168,13 +168,13 @@ def rise(
         Specification of the event.
     """
     return _specify_quantity_event(
-        EventKind.RISE, quantity, level, terminal=terminal, may_defer=may_defer
+        EventKind.RISE, quantity, level, terminal=terminal, may_report_later=may_report_later
     )
 
 
 @accept_former_keyword_names
 def fall(
-    quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
+    quantity: str, level: float, *, terminal: bool = False, may_report_later: bool = False
 ) -> EventSpecification:
     """Create an event specification for downward crossings of a level.
 
@@ -196,17 +196,17 @@ def fall(
         Specification of the event.
     """
     return _specify_quantity_event(
-        EventKind.FALL, quantity, level, terminal=terminal, may_defer=may_defer
+        EventKind.FALL, quantity, level, terminal=terminal, may_report_later=may_report_later
     )
 
 
 def _specify_quantity_event(
-    kind: EventKind, quantity: str, level: float = 0.0, *, terminal: bool, may_defer: bool
+    kind: EventKind, quantity: str, level: float = 0.0, *, terminal: bool, may_report_later: bool
 ) -> EventSpecification:
     """Create an event specification. Former quantity names are also accepted."""
     if quantity not in MotionPoint._fields:
         quantity = translate_former_member_name(MotionPoint, quantity)
-    return EventSpecification(kind, quantity, level, terminal, may_defer)
+    return EventSpecification(kind, quantity, level, terminal, may_report_later)
 
 
 @accept_former_keyword_names
@@ -267,7 +267,7 @@ class Event(NamedTuple):
     point: MotionPoint
     regime: str
     evaluation_count: int
-    clock: float
+    independent_variable: float
 
 
 if not TYPE_CHECKING:

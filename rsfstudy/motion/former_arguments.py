@@ -22,14 +22,14 @@ from rsfstudy.motion.work_meter import WorkMeter
 
 AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
 
-_FORMER_NAMES = ("accuracy", "meter")
-_CALL_REMEDY = (
+_FORMER_ARGUMENT_NAMES = ("accuracy", "meter")
+_REMEDY_FOR_FORMER_ARGUMENTS = (
     "Pass integrator=integrator, as Measure.compute receives it. The arguments accuracy=accuracy, "
     "meter=meter will be removed in 1.0.0."
 )
 
 
-def accept_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
+def accept_former_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
     """Let a function with an ``integrator`` accept the deprecated arguments.
 
     Parameters
@@ -45,13 +45,13 @@ def accept_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
         The same function or class.
     """
     if isinstance(function, type):
-        _adapt_former_compute(function)
+        _adapt_former_compute_method(function)
         return function
-    function.convert_arguments = replace_accuracy_and_meter  # type: ignore[attr-defined]
+    function.convert_arguments = replace_former_arguments_by_integrator  # type: ignore[attr-defined]
     return function
 
 
-def replace_accuracy_and_meter(
+def replace_former_arguments_by_integrator(
     arguments: tuple[Any, ...], keywords: dict[str, Any]
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
     """Replace the arguments ``accuracy`` and ``meter`` by an integrator.
@@ -79,27 +79,33 @@ def replace_accuracy_and_meter(
     pair = {
         **dict(
             zip(
-                _FORMER_NAMES,
+                _FORMER_ARGUMENT_NAMES,
                 (a for a in arguments if isinstance(a, Accuracy | WorkMeter)),
                 strict=False,
             )
         ),
-        **{name: keywords[name] for name in _FORMER_NAMES if keywords.get(name) is not None},
+        **{
+            name: keywords[name]
+            for name in _FORMER_ARGUMENT_NAMES
+            if keywords.get(name) is not None
+        },
     }
     if not pair:
         return arguments, keywords
-    accuracy, meter = (pair.get(name) for name in _FORMER_NAMES)
+    accuracy, meter = (pair.get(name) for name in _FORMER_ARGUMENT_NAMES)
     if not (isinstance(accuracy, Accuracy) and isinstance(meter, WorkMeter)):
         rule = "must be an Accuracy and a WorkMeter"
-        raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=_CALL_REMEDY)
-    text = f"An integrator has replaced the arguments accuracy and meter. {_CALL_REMEDY}"
+        raise InvalidValue(
+            "accuracy, meter", (accuracy, meter), rule, remedy=_REMEDY_FOR_FORMER_ARGUMENTS
+        )
+    text = f"An integrator has replaced the arguments accuracy and meter. {_REMEDY_FOR_FORMER_ARGUMENTS}"
     warnings.warn(text, DeprecationWarning, stacklevel=find_stacklevel_of_user_code())
     rest = tuple(a for a in arguments if not isinstance(a, Accuracy | WorkMeter))
-    others = {name: value for name, value in keywords.items() if name not in _FORMER_NAMES}
-    return rest, {**others, "integrator": Integrator(accuracy).counted_by(meter)}
+    others = {name: value for name, value in keywords.items() if name not in _FORMER_ARGUMENT_NAMES}
+    return rest, {**others, "integrator": Integrator(accuracy).with_work_meter(meter)}
 
 
-def _adapt_former_compute(measure_class: type) -> None:
+def _adapt_former_compute_method(measure_class: type) -> None:
     """Adapt the method ``compute`` of a measure to take an integrator.
 
     A method with the former parameters ``scene``, ``accuracy`` and ``meter`` is replaced by a
@@ -109,7 +115,7 @@ def _adapt_former_compute(measure_class: type) -> None:
     if not inspect.isfunction(compute):
         return
     if not _takes_accuracy_and_meter(compute):
-        accept_accuracy_and_meter(compute)
+        accept_former_accuracy_and_meter(compute)
         return
     text = (
         f"{measure_class.__name__}.compute takes scene, accuracy and meter. Write "
@@ -120,16 +126,18 @@ def _adapt_former_compute(measure_class: type) -> None:
 
     @functools.wraps(compute)
     def compute_with_integrator(*arguments: Any, **keywords: Any) -> Any:
-        (measure, scene, *given), keywords = replace_accuracy_and_meter(arguments, keywords)
+        (measure, scene, *given), keywords = replace_former_arguments_by_integrator(
+            arguments, keywords
+        )
         integrator = given[0] if given else keywords["integrator"]
         return compute(measure, scene, integrator.accuracy, integrator.work_meter)
 
     measure_class.compute = compute_with_integrator  # type: ignore[attr-defined]
 
 
-def _takes_accuracy_and_meter(compute: Callable[..., Any]) -> bool:
+def _takes_accuracy_and_meter(compute_method: Callable[..., Any]) -> bool:
     """Return True if a method has three parameters in addition to ``self``."""
     kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
-    parameters = inspect.signature(compute).parameters.values()
+    parameters = inspect.signature(compute_method).parameters.values()
     required = [p for p in parameters if p.kind in kinds and p.default is p.empty]
     return len(required) == 4

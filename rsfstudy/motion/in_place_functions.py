@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from rsfstudy.motion.array_layout import FIRST_STATE, LOG_SLIP_RATE
 from rsfstudy.motion.steppers import unrolled_step
-from rsfstudy.slider import Equations, Function, Numbers
+from rsfstudy.slider import EquationsOfMotion, FloatTuple, NumericFunction
 
 
 class InPlaceFunctions(NamedTuple):
@@ -38,13 +38,13 @@ class InPlaceFunctions(NamedTuple):
         the inertial equations of motion in ruptures.
     """
 
-    fill_rates: Function
-    fill_point: Function
-    attempt_step: Function
-    fill_balance: Function | None
+    fill_rates: NumericFunction
+    fill_point: NumericFunction
+    attempt_step: NumericFunction
+    fill_force_balance: NumericFunction | None
 
 
-def build_in_place_functions(equations: Equations) -> InPlaceFunctions:
+def build_in_place_functions(equations: EquationsOfMotion) -> InPlaceFunctions:
     """Convert the functions of a system of equations to functions that fill arrays.
 
     Parameters
@@ -60,7 +60,7 @@ def build_in_place_functions(equations: Equations) -> InPlaceFunctions:
     """
     rate, point, balance = (
         equations.rate_function,
-        equations.point_function,
+        equations.motion_point_function,
         equations.force_balance_function,
     )
     return _build_in_place_functions_cached(
@@ -75,9 +75,9 @@ def build_in_place_functions(equations: Equations) -> InPlaceFunctions:
 
 @cache
 def _build_in_place_functions_cached(
-    rate_function: Function,
-    point_function: Function,
-    force_balance_function: Function | None,
+    rate_function: NumericFunction,
+    point_function: NumericFunction,
+    force_balance_function: NumericFunction | None,
     unknown_count: int,
     state_count: int,
     parameter_count: int,
@@ -93,8 +93,8 @@ def _build_in_place_functions_cached(
         attempt_step=unrolled_step.build_step_attempt_function(
             rate_function, unknown_count, numbers
         ),
-        fill_balance=force_balance_function
-        and build_fill_balance_function(
+        fill_force_balance=force_balance_function
+        and build_fill_force_balance_function(
             force_balance_function,
             build_array_unpacking_function(state_count, first_index=1),
             numbers,
@@ -103,11 +103,11 @@ def _build_in_place_functions_cached(
 
 
 def build_fill_rates_function(
-    rate_function: Function,
-    unpack_unknowns: Function,
-    unpack_parameters: Function,
+    rate_function: NumericFunction,
+    unpack_unknowns: NumericFunction,
+    unpack_parameters: NumericFunction,
     unknown_count: int,
-) -> Function:
+) -> NumericFunction:
     """Build the function that fills in the derivatives of the unknowns.
 
     Parameters
@@ -136,11 +136,11 @@ def build_fill_rates_function(
 
 
 def build_fill_point_function(
-    point_function: Function,
-    unpack_unknowns: Function,
-    unpack_parameters: Function,
+    point_function: NumericFunction,
+    unpack_unknowns: NumericFunction,
+    unpack_parameters: NumericFunction,
     state_count: int,
-) -> Function:
+) -> NumericFunction:
     """Build the function that fills an array with a point of the motion.
 
     Parameters
@@ -170,9 +170,11 @@ def build_fill_point_function(
     return fill_point
 
 
-def build_fill_balance_function(
-    force_balance_function: Function, unpack_states: Function, unpack_parameters: Function
-) -> Function:
+def build_fill_force_balance_function(
+    force_balance_function: NumericFunction,
+    unpack_states: NumericFunction,
+    unpack_parameters: NumericFunction,
+) -> NumericFunction:
     """Build the function that solves the force balance on the slow manifold.
 
     Parameters
@@ -201,7 +203,9 @@ def build_fill_balance_function(
 
 
 @cache
-def build_array_unpacking_function(item_count: int, first_index: int = 0) -> Callable[..., Numbers]:
+def build_array_unpacking_function(
+    item_count: int, first_index: int = 0
+) -> Callable[..., FloatTuple]:
     """Build a function that converts items of an array to a tuple.
 
     Parameters
@@ -219,5 +223,5 @@ def build_array_unpacking_function(item_count: int, first_index: int = 0) -> Cal
     made: dict[str, Any] = {}
     listed = ", ".join(f"y[{i}]" for i in range(first_index, first_index + item_count))
     exec(f"def unpacked(y):\n    return ({listed},)", made)
-    function: Callable[..., Numbers] = made["unpacked"]
+    function: Callable[..., FloatTuple] = made["unpacked"]
     return function

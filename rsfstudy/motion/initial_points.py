@@ -14,14 +14,14 @@ from rsfstudy.motion import regime_switching
 from rsfstudy.motion.overflow_reports import convert_overflow_to_motion_stopped
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.parts import Segment
-from rsfstudy.slider import MotionPoint, Numbers, Scene
+from rsfstudy.slider import FloatTuple, MotionPoint, Scene
 from rsfstudy.status import Status
 
 _NAN_FOR_UNEVALUATED_POINT_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
 
 
 @convert_overflow_to_motion_stopped
-def initial_point(scene: Scene) -> MotionPoint:
+def compute_initial_point(scene: Scene) -> MotionPoint:
     """Return the initial point of a motion, immediately after the loading step.
 
     Before the loading step, the slider slides steadily at V_*, or has the initial stress and state
@@ -51,11 +51,13 @@ def initial_point(scene: Scene) -> MotionPoint:
         psis, log_slip_rate = _find_specified_initial_states(scene, psis)
     psis = _reset_loading_unknowns(scene, psis)
     stress = scene.parts.slider.initial_stress + scene.spring_stress_step
-    stepped = point_without_derived_values(scene, stress, psis)
-    return point_with_slip_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
+    stepped = build_point_without_derived_values(scene, stress, psis)
+    return (
+        compute_point_with_slip_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
+    )
 
 
-def point_before_start(scene: Scene) -> MotionPoint:
+def compute_point_before_start(scene: Scene) -> MotionPoint:
     """Return the point of a motion before its first loading step.
 
     Parameters
@@ -75,10 +77,10 @@ def point_before_start(scene: Scene) -> MotionPoint:
     return before.slow_manifold_point(scene.parts.slider.initial_stress, psis)
 
 
-def point_without_derived_values(
+def build_point_without_derived_values(
     scene: Scene,
     spring_stress: float,
-    states: Numbers,
+    states: FloatTuple,
     log_slip_rate: float = math.nan,
     frictional_stress: float = math.nan,
 ) -> MotionPoint:
@@ -109,7 +111,7 @@ def point_without_derived_values(
 
 
 @convert_overflow_to_motion_stopped
-def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
+def compute_restart_point(scene: Scene, spring_stress: float, states: FloatTuple) -> MotionPoint:
     """Return a point on the slow manifold from which a motion can restart.
 
     Parameters
@@ -135,12 +137,12 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
     balance = scene.equations_between_ruptures(with_time=False).force_balance_function
     assert balance is not None
     x, friction, _shift = balance(spring_stress, states, scene.parameter_values)
-    point = point_without_derived_values(scene, spring_stress, states, x, friction)
+    point = build_point_without_derived_values(scene, spring_stress, states, x, friction)
     check_forward_slip_is_possible_at_start(scene, point)
     return point
 
 
-def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
+def _reset_loading_unknowns(scene: Scene, states: FloatTuple) -> FloatTuple:
     """Replace the unknowns of the loading by their initial values.
 
     In the tuple of unknowns, the unknowns of the loading come after the states of the friction law
@@ -151,7 +153,9 @@ def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
     return (*states[:kept], *begun, *states[kept + len(begun) : scene.state_count])
 
 
-def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
+def _find_specified_initial_states(
+    scene: Scene, steady_states: FloatTuple
+) -> tuple[FloatTuple, float]:
     """Find the states and ln(V/V_*) for the initial stress and state of the scene.
 
     The function solves for the value of Psi that gives the specified state variable.
@@ -170,7 +174,7 @@ def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tupl
 
 
 @convert_overflow_to_motion_stopped
-def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
+def compute_point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
     """Return the point of a motion immediately after a jump in the loading.
 
     A jump in the loading is a step of the load point, a step of imposed normal stress, or the
@@ -198,10 +202,14 @@ def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
     psis = _reset_loading_unknowns(scene, point.psis)
     after = point._replace(spring_stress=point.spring_stress + scene.spring_stress_step, psis=psis)
     check_forward_slip_is_possible_at_start(scene, after)
-    return point_with_slip_rate(scene, after, point.log_slip_rate) if scene.has_mass else after
+    return (
+        compute_point_with_slip_rate(scene, after, point.log_slip_rate) if scene.has_mass else after
+    )
 
 
-def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float) -> MotionPoint:
+def compute_point_with_slip_rate(
+    scene: Scene, point: MotionPoint, log_slip_rate: float
+) -> MotionPoint:
     r"""Return a copy of a point with a new slip rate and the resulting friction.
 
     Parameters

@@ -16,18 +16,18 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.motion import initial_points
 from rsfstudy.motion.accuracy import Accuracy, estimate_error
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
-from rsfstudy.motion.initial_points import initial_point, point_after_loading_jump
+from rsfstudy.motion.initial_points import compute_initial_point, compute_point_after_loading_jump
 from rsfstudy.motion.motion_driver import MotionDriver, get_motion_driver
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.regime_switching import compute_switch_thresholds, inertia_matters_at
+from rsfstudy.motion.regime_switching import compute_regime_switch_thresholds, inertia_matters_at
 from rsfstudy.motion.segment_chains import (
-    begin_noise,
-    drop_settling_if_unstable,
-    find_remaining_segment_chains,
+    drop_settling_events_if_unstable,
+    find_segments_left_to_integrate,
     iterate_segment_start_events,
-    list_segment_chains,
-    select_event_specs,
-    truncate_segments_at,
+    prepare_segment_with_noise,
+    select_possible_event_specs,
+    split_segments_at_stress_jumps,
+    truncate_segment_table_at_time,
 )
 from rsfstudy.motion.work_meter import MIN_LOCAL_TOLERANCE, WorkMeter
 from rsfstudy.parts import (
@@ -36,7 +36,7 @@ from rsfstudy.parts import (
     SEGMENT_END,
     SEGMENT_LOG_VELOCITY,
 )
-from rsfstudy.slider import Equations, MotionPoint, Numbers, Scene
+from rsfstudy.slider import EquationsOfMotion, FloatTuple, MotionPoint, Scene
 
 
 @wrap_methods_in_error_boundary
@@ -69,10 +69,10 @@ class Integrator:
     #: Smallest possible value of ``local_tolerance``.
     MIN_LOCAL_TOLERANCE = MIN_LOCAL_TOLERANCE
 
-    initial_point = staticmethod(initial_points.initial_point)
-    point_before_start = staticmethod(initial_points.point_before_start)
+    initial_point = staticmethod(initial_points.compute_initial_point)
+    point_before_start = staticmethod(initial_points.compute_point_before_start)
     restart_point = staticmethod(initial_points.compute_restart_point)
-    point_with_slip_rate = staticmethod(initial_points.point_with_slip_rate)
+    point_with_slip_rate = staticmethod(initial_points.compute_point_with_slip_rate)
 
     def __init__(self, accuracy: Accuracy) -> None:
         """Create an integrator whose evaluation count is zero."""
@@ -103,7 +103,7 @@ class Integrator:
         """True if the number of evaluations exceeds the work budget."""
         return self.work_meter.evaluations > self.work_meter.budget
 
-    def counted_by(self, work_meter: WorkMeter) -> Integrator:
+    def with_work_meter(self, work_meter: WorkMeter) -> Integrator:
         """Return a copy that adds its evaluations to a different counter.
 
         Parameters
@@ -260,8 +260,8 @@ class Integrator:
 
     def follow_equations(
         self,
-        equations: Equations,
-        initial_unknowns: Numbers,
+        equations: EquationsOfMotion,
+        initial_unknowns: FloatTuple,
         event_specs: Sequence[EventSpecification] = (),
         *,
         local_tolerance: float | None = None,
@@ -350,24 +350,26 @@ class Integrator:
             ``work_budget_spent`` if the budget is exhausted. The status is ``integration_failed``
             if the stepper fails or a value is not finite.
         """
-        chains = list_segment_chains(scene, only_last_segment=start is not None)
+        chains = split_segments_at_stress_jumps(scene, only_last_segment=start is not None)
         with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
         with_time = with_time or scene.parts.loading_noise.is_active
         time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
         if resume_from is not None:
-            chains, start = find_remaining_segment_chains(scene, resume_from)
+            chains, start = find_segments_left_to_integrate(scene, resume_from)
             time, slip = resume_from.time, resume_from.slip
         for number, (acting, table) in enumerate(chains):
             if start is None:
-                start = initial_point(acting)
+                start = compute_initial_point(acting)
             elif number:
-                start = point_after_loading_jump(acting, start)
+                start = compute_point_after_loading_jump(acting, start)
             is_last = number == len(chains) - 1
-            asked = select_event_specs(scene, acting, event_specs, is_last_chain=is_last)
-            table = truncate_segments_at(table, until)
+            asked = select_possible_event_specs(
+                scene, acting, event_specs, includes_last_segment=is_last
+            )
+            table = truncate_segment_table_at_time(table, until)
             end, further, parameters = float(table[-1, SEGMENT_END]), None, None
             if scene.parts.loading_noise.is_active:
-                start, parameters, table, further = begin_noise(acting, start, table)
+                start, parameters, table, further = prepare_segment_with_noise(acting, start, table)
                 told = 0  # Every loading segment starts a chain, which reports its start.
             motion = get_motion_driver(
                 acting, self.engine, self.accuracy.methods, with_time=with_time
@@ -381,7 +383,7 @@ class Integrator:
                     time,
                     slip,
                 ),
-                switch_thresholds=compute_switch_thresholds(acting, self.accuracy),
+                switch_thresholds=compute_regime_switch_thresholds(acting, self.accuracy),
                 recording=recording,
                 kinks_and_reported_count=(table[1:], told),
                 initial_imposed_stress=acting.parameter_values[LOADING + 2]
@@ -390,7 +392,7 @@ class Integrator:
                 parameters=parameters,
                 further_kinks=further,
             )
-            motion = drop_settling_if_unstable(scene, motion)
+            motion = drop_settling_events_if_unstable(scene, motion)
             if before is None and end == math.inf:  # The motion consists of a single chain.
                 yield from motion
                 return
@@ -408,7 +410,7 @@ class Integrator:
                 # The located end time has a rounding error.
                 last = last._replace(time=end)
                 if recording is not None:
-                    recording.clip_recorded_times(end)
+                    recording.cap_recorded_times_at(end)
             if end >= until:
                 yield last
                 return

@@ -18,41 +18,48 @@ import numpy as np
 from rsfstudy.motion import array_layout, workspace
 from rsfstudy.motion.engine_factory import create_stepper, import_compiled_engine
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.event_spec_table import pack_event_specifications, pack_point
+from rsfstudy.motion.event_spec_table import (
+    pack_event_specifications_into_table,
+    pack_point_into_array,
+)
 from rsfstudy.motion.events import Event, EventSpecification
 from rsfstudy.motion.overflow_reports import describe_overflow
 from rsfstudy.motion.python_backend import PythonBackend
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
     SAMPLES_PER_STEP,
-    SHEAR_STRESS_COLUMNS,
+    SPRING_AND_FRICTIONAL_STRESS_COLUMNS,
     Recording,
 )
 from rsfstudy.motion.regime_switching import (
-    UNUSED_SWITCH_THRESHOLDS,
-    SwitchThresholds,
+    SWITCH_THRESHOLDS_WITHOUT_INERTIA,
+    RegimeSwitchThresholds,
     build_termination_error,
 )
 from rsfstudy.motion.work_meter import (
     MIN_LOCAL_TOLERANCE,
-    TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS,
+    REFERENCE_TOLERANCE_OF_MAX_STEP_LENGTH,
     MotionStopped,
     WorkMeter,
 )
 from rsfstudy.parts import SEGMENT_STRESS_FALL
-from rsfstudy.slider import Equations, MotionPoint, Numbers, Scene, cached_per_scene
+from rsfstudy.slider import EquationsOfMotion, FloatTuple, MotionPoint, Scene, cached_per_scene
 from rsfstudy.status import Status
 
 #: Minimum number of rows of the event table, and number of rows of the recording table.
 _MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
 #: Constructor of named tuples, which is twice as fast as a normal constructor call.
 _make_named_tuple_without_checks = tuple.__new__
-_STEP_TOO_SHORT_TEXT = (
+_STEP_TOO_SHORT_MESSAGE = (
     "the required step size is smaller than the spacing of floating-point numbers"
 )
-_EMPTY_RECORDING_TABLES = array_layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
+_EMPTY_TABLES_WITHOUT_RECORDING = (
+    array_layout.RECORD_NEVER,
+    np.empty(0),
+    np.empty((0, FIRST_STATE_COLUMN)),
+)
 #: Index of the segment table in the arguments of the loop that follow the motion state.
-_KINKS_ARGUMENT = 5
+_LOOP_ARGUMENT_INDEX_OF_KINKS = 5
 _EMPTY_KINK_TABLE_AND_ZERO_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
@@ -78,15 +85,15 @@ class MotionDriver:
 
     def __init__(
         self,
-        slow_equations: Equations,
-        fast_equations: Equations | None = None,
+        slow_equations: EquationsOfMotion,
+        fast_equations: EquationsOfMotion | None = None,
         *,
         engine: str,
         methods: Sequence[tuple[str, str]] = (),
         **fields: float,
     ) -> None:
         self._engine, self._methods = engine, dict(methods)
-        self._equations: tuple[Equations, ...] = (
+        self._equations: tuple[EquationsOfMotion, ...] = (
             (slow_equations,) if fast_equations is None else (slow_equations, fast_equations)
         )
         self._backend = (
@@ -99,10 +106,10 @@ class MotionDriver:
         self._unknowns = max(unknowns)
         scales = np.array([scale for system in self._equations for scale in system.unknown_scales])
         self._scales_and_functions = (
-            *self._backend.as_loop_arguments(scales),
+            *self._backend.convert_arrays_for_motion_loop(scales),
             self._backend.build_function_table(self._equations),
         )
-        self._p = self._backend.as_loop_parameters(slow_equations.parameters)
+        self._p = self._backend.convert_parameters_for_motion_loop(slow_equations.parameters)
         self._regimes = [system.regime for system in self._equations]
         fields |= {
             "pending_start": array_layout.START_CODE,
@@ -113,19 +120,19 @@ class MotionDriver:
             "unknowns_fast": sum(unknowns[1:]),
             "has_mass": fast_equations is not None,
         }
-        self._initial_values = self._backend.initial_state_values(tuple(fields.items()))
+        self._initial_values = self._backend.pack_initial_motion_state(tuple(fields.items()))
 
     def iterate_events(
         self,
-        start_point_or_unknowns: MotionPoint | Numbers,
+        start_point_or_unknowns: MotionPoint | FloatTuple,
         work_meter: WorkMeter,
         event_specs: Sequence[EventSpecification],
         tolerance: float,
         *,
         duration_start_time_and_slip: tuple[float, float, float] = (math.inf, 0.0, 0.0),
         backward: bool = False,
-        parameters: Numbers | None = None,
-        switch_thresholds: SwitchThresholds = UNUSED_SWITCH_THRESHOLDS,
+        parameters: FloatTuple | None = None,
+        switch_thresholds: RegimeSwitchThresholds = SWITCH_THRESHOLDS_WITHOUT_INERTIA,
         evaluation_budget: float = math.inf,
         recording: Recording | None = None,
         kinks_and_reported_count: tuple[np.ndarray, int] = _EMPTY_KINK_TABLE_AND_ZERO_COUNT,
@@ -183,7 +190,7 @@ class MotionDriver:
             If the motion cannot continue or exceeds the budget.
         """
         machine, states, numbers = self._backend, self._states, self._p
-        systems: Iterable[Equations] = self._equations
+        systems: Iterable[EquationsOfMotion] = self._equations
         before, turns = numbers, len(kinks_and_reported_count[0])
         if isinstance(start_point_or_unknowns, MotionPoint):
             start_point_or_unknowns = (
@@ -196,7 +203,7 @@ class MotionDriver:
             )
             y, last, stress = (
                 np.empty(2 * self._unknowns),
-                pack_point(start_point_or_unknowns),
+                pack_point_into_array(start_point_or_unknowns),
                 start_point_or_unknowns.spring_stress,
             )
         else:  # The second half of the array holds the derivatives.
@@ -206,11 +213,11 @@ class MotionDriver:
                 0.0,
             )
         if parameters is not None or turns:  # The loop changes the parameters at kinks.
-            before = numbers = machine.as_loop_parameters(
+            before = numbers = machine.convert_parameters_for_motion_loop(
                 self._equations[0].parameters if parameters is None else parameters
             )
             if turns:
-                before = machine.as_loop_parameters(numbers)
+                before = machine.convert_parameters_for_motion_loop(numbers)
             systems = (system._replace(parameters=numbers) for system in self._equations)
         tolerance = max(tolerance, MIN_LOCAL_TOLERANCE)
         records, samples, rows = _prepare_recording_tables(recording, self._equations[0], states)
@@ -220,36 +227,38 @@ class MotionDriver:
                 *(*duration_start_time_and_slip, stress, tolerance),
                 # The step limit depends on the tolerance. Otherwise, two runs with different
                 # tolerances could share an error, and their difference would not reveal the error.
-                (tolerance / TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS) ** 0.125,
+                (tolerance / REFERENCE_TOLERANCE_OF_MAX_STEP_LENGTH) ** 0.125,
                 -1.0 if backward else 1.0,
                 int(min(evaluation_budget, work_meter.budget - work_meter.evaluations)),
                 *(records, turns, kinks_and_reported_count[1]),
             ),
         )
-        asked, meanings = pack_event_specifications(tuple(event_specs))
+        asked, meanings = pack_event_specifications_into_table(tuple(event_specs))
         stepper = create_stepper(self._engine, systems, self._methods)
         columns = array_layout.EVENT_POINT + array_layout.FIRST_STATE + states
         events = np.empty((max(_MIN_EVENT_ROWS, 2 * len(event_specs) + 4), columns))
-        block = np.empty(workspace.workspace_size(self._unknowns, states, len(event_specs)))
+        block = np.empty(workspace.compute_workspace_size(self._unknowns, states, len(event_specs)))
         arguments = [
-            *machine.as_loop_arguments(y, last, block),
+            *machine.convert_arrays_for_motion_loop(y, last, block),
             (*self._scales_and_functions, tuple(switch_thresholds), numbers, before),
-            *machine.as_loop_arguments(
+            *machine.convert_arrays_for_motion_loop(
                 asked.copy(), kinks_and_reported_count[0], samples, events, rows
             ),
             stepper,
         ]
         regimes, psis = self._regimes, array_layout.EVENT_POINT + array_layout.FIRST_STATE
-        run, end, known = machine.get_loop_function(), array_layout.PAUSED, (0, 0, 0, 0)
+        run, end, known = machine.get_motion_loop_function(), array_layout.PAUSED, (0, 0, 0, 0)
         while end == array_layout.PAUSED:
-            end = run(state.memory, *arguments)
-            slow, fast, steps, happened, recorded, jacobians = state.work_and_row_counters()
+            end = run(state.motion_state_array, *arguments)
+            slow, fast, steps, happened, recorded, jacobians = state.get_work_and_row_counts()
             known, settled = (slow, fast, steps, jacobians), known
-            others = work_meter.charge_new_work(regimes, settled, known)
+            others = work_meter.charge_work_since_last_call(regimes, settled, known)
             if recording is not None and recorded:
                 kept = rows[:recorded].copy(order="F")  # Recordings are read by column.
                 if initial_imposed_stress is not None:
-                    kept[:, SHEAR_STRESS_COLUMNS] += kept[:, -1:] - initial_imposed_stress
+                    kept[:, SPRING_AND_FRICTIONAL_STRESS_COLUMNS] += (
+                        kept[:, -1:] - initial_imposed_stress
+                    )
                 recording.append_rows(kept, regimes)
             for line in events[:happened].tolist():
                 code, regime, clock, time, slip, spent = line[: array_layout.EVENT_POINT]
@@ -266,15 +275,17 @@ class MotionDriver:
             work_meter.check_budget()
             if further_kinks is not None and state.get_state_field("kinks_ahead") == 0.0:
                 for table in islice(further_kinks, 1):
-                    arguments[_KINKS_ARGUMENT] = machine.as_loop_arguments(table)[0]
-                    state.set_kinks_ahead(len(table))
+                    arguments[_LOOP_ARGUMENT_INDEX_OF_KINKS] = (
+                        machine.convert_arrays_for_motion_loop(table)[0]
+                    )
+                    state.set_remaining_kink_count(len(table))
         if end != array_layout.MOTION_ENDED:
             overflow = ""
             if end in (array_layout.NO_STEP_POSSIBLE, array_layout.INVALID_STEP):
                 system = self._equations[int(state.get_state_field("regime"))]
                 unknowns = tuple(y[: len(system.unknown_names)].tolist())
                 overflow = describe_overflow(system.rate_function, unknowns, tuple(numbers))
-            raise _motion_stopped_error(end, state, regimes, stepper, overflow)
+            raise _build_motion_stopped_error(end, state, regimes, stepper, overflow)
 
 
 def _shift_stresses_of_point(point: MotionPoint, stress_change: float) -> MotionPoint:
@@ -326,18 +337,18 @@ def get_motion_driver(
 
 
 def _prepare_recording_tables(
-    recording: Recording | None, equations: Equations, state_count: int
+    recording: Recording | None, equations: EquationsOfMotion, state_count: int
 ) -> tuple[int, np.ndarray, np.ndarray]:
     """Return the recording mode, requested samples and output table."""
     if recording is None:
-        return _EMPTY_RECORDING_TABLES
+        return _EMPTY_TABLES_WITHOUT_RECORDING
     if recording.sample_times is None:
         return (
             array_layout.RECORD_WITHIN_STEPS,
             np.empty(0),
             np.empty((_RECORDING_ROWS, FIRST_STATE_COLUMN + state_count)),
         )
-    samples = recording.remaining_sample_times()
+    samples = recording.list_unrecorded_sample_times()
     rows = np.empty((len(samples) + 2 * SAMPLES_PER_STEP, FIRST_STATE_COLUMN + state_count))
     return (
         array_layout.RECORD_AT_CLOCKS if equations.is_rigid else array_layout.RECORD_AT_TIMES,
@@ -346,7 +357,7 @@ def _prepare_recording_tables(
     )
 
 
-def _motion_stopped_error(
+def _build_motion_stopped_error(
     return_code: int,
     motion_state: Any,
     regime_names: Sequence[str],
@@ -361,7 +372,7 @@ def _motion_stopped_error(
         )
     why = "the step size is zero, or a value is not finite"
     if return_code == array_layout.NO_STEP_POSSIBLE:
-        why = stepper.failure if stepper else _STEP_TOO_SHORT_TEXT
+        why = stepper.failure if stepper else _STEP_TOO_SHORT_MESSAGE
     why = overflow or why
     return MotionStopped(
         Status.INTEGRATION_FAILED,

@@ -67,18 +67,18 @@ from rsfstudy.motion.array_layout import (
 )
 from rsfstudy.motion.array_operations import (
     advance_pointer_by_items,
-    array_as_pointer,
+    convert_array_to_pointer,
     copy_values,
     evaluate_function_into_array,
 )
 from rsfstudy.motion.recording import SAMPLES_PER_STEP
 from rsfstudy.motion.regime_starts import (
     enter_initial_regime,
-    set_unknowns_of_regime,
+    set_initial_unknowns_of_regime,
     start_next_segment,
 )
-from rsfstudy.motion.regime_switching import CONTINUES, SwitchThresholds
-from rsfstudy.motion.step_conditions import has_deferrable_event
+from rsfstudy.motion.regime_switching import CONTINUES, RegimeSwitchThresholds
+from rsfstudy.motion.step_conditions import may_any_event_be_reported_later
 from rsfstudy.motion.step_ends import (
     has_rupture_regime_ended,
     is_step_end_valid,
@@ -90,17 +90,21 @@ from rsfstudy.motion.step_events import (
     append_step_end_event,
 )
 from rsfstudy.motion.step_integration import (
+    compute_time_at_step_end,
     halve_step_until_dense_output_is_accurate,
     take_step,
-    time_at_step_end,
 )
-from rsfstudy.motion.step_samples import is_step_recorded, record_regime_start, record_step
-from rsfstudy.motion.steppers import begin_regime
+from rsfstudy.motion.step_samples import (
+    record_regime_start,
+    record_step_samples,
+    should_record_step,
+)
+from rsfstudy.motion.steppers import begin_integration_of_regime
 from rsfstudy.motion.workspace import create_workspace
 
 
 def advance_motion(
-    motion_memory,
+    motion_state_array,
     y,
     last_point,
     workspace_block,
@@ -149,22 +153,22 @@ def advance_motion(
         the tables and calls the function again. If the scene has noise, the loop also pauses at the
         start of the last segment, so that the caller can append the next segments.
     """
-    motion = motion_memory[0]
+    motion = motion_state_array[0]
     motion.event_rows = motion.recorded_rows = 0
     scales, functions, numbers, p, p_before = loop_constants
     y, scales, workspace_block = (
-        array_as_pointer(y),
-        array_as_pointer(scales),
-        array_as_pointer(workspace_block),
+        convert_array_to_pointer(y),
+        convert_array_to_pointer(scales),
+        convert_array_to_pointer(workspace_block),
     )
     last_point, p, p_before = (
-        array_as_pointer(last_point),
-        array_as_pointer(p),
-        array_as_pointer(p_before),
+        convert_array_to_pointer(last_point),
+        convert_array_to_pointer(p),
+        convert_array_to_pointer(p_before),
     )
-    limits = SwitchThresholds(*numbers)
+    limits = RegimeSwitchThresholds(*numbers)
     given = (
-        array_as_pointer(event_specs),
+        convert_array_to_pointer(event_specs),
         len(event_specs) // len(EVENT_SPECIFICATION_COLUMNS),
         p,
         p_before,
@@ -188,7 +192,7 @@ def advance_motion(
         if end == REGIME_ENDED:
             motion.regime = SLOW_REGIME if motion.regime == FAST_REGIME else FAST_REGIME
             motion.pending_start, motion.next_step_length = REGIME_CODE, 0.0
-            set_unknowns_of_regime(motion, y, last_point)
+            set_initial_unknowns_of_regime(motion, y, last_point)
         elif end == SEGMENT_ENDED:
             regime, end = motion.regime, REGIME_ENDED
             start_next_segment(motion, workspace, last_point, kinks, recording_table)
@@ -198,13 +202,15 @@ def advance_motion(
         if end == REGIME_ENDED and (
             motion.must_report
             or (motion.noise_rate_index > 0 and motion.kinks_ahead == 0)
-            or are_tables_full(motion, workspace.event_spec_count, event_table, recording_table)
+            or are_output_tables_nearly_full(
+                motion, workspace.event_spec_count, event_table, recording_table
+            )
         ):
             motion.must_report, end = 0, PAUSED
     return end
 
 
-def are_tables_full(motion, event_spec_count, event_table, recording_table):
+def are_output_tables_nearly_full(motion, event_spec_count, event_table, recording_table):
     """Return True if the output tables may be too small for one more step.
 
     Parameters
@@ -259,7 +265,7 @@ def integrate_one_regime(
     """
     if motion.pending_start:
         motion.time_per_step = 0.0
-        begin_regime(motion, workspace)
+        begin_integration_of_regime(motion, workspace)
         if motion.pending_start != KINK_CODE:
             motion.dense_output_limit = math.inf
     else:
@@ -279,7 +285,7 @@ def integrate_one_regime(
         taken = take_step(motion, workspace)
         if taken != STEP_TAKEN_CODE:
             return taken
-        if is_step_recorded(motion, workspace, requested_samples):
+        if should_record_step(motion, workspace, requested_samples):
             halve_step_until_dense_output_is_accurate(motion, workspace)
         evaluate_function_into_array(
             workspace.functions.fill_point,
@@ -297,11 +303,11 @@ def integrate_one_regime(
             record_regime_start(motion, workspace, recording_table)
             if append_start_events(motion, workspace, last_point, event_table):
                 return MOTION_ENDED
-        complete = motion.recording_mode and record_step(
+        complete = motion.recording_mode and record_step_samples(
             motion, workspace, recording_table, requested_samples, over
         )
         urgent = append_events_in_step(motion, workspace, event_table)
-        if motion.pending_start == START_CODE and not has_deferrable_event(workspace):
+        if motion.pending_start == START_CODE and not may_any_event_be_reported_later(workspace):
             urgent = max(urgent, 2)
         motion.pending_start = 0
         if urgent == 3:
@@ -316,13 +322,13 @@ def integrate_one_regime(
             append_step_end_event(motion, workspace, event_table, END_CODE)
             return MOTION_ENDED
         if leaves or has_rupture_regime_ended(motion, workspace):
-            motion.regime_start_time = time_at_step_end(motion, workspace)
+            motion.regime_start_time = compute_time_at_step_end(motion, workspace)
             copy_values(workspace.point_at_end, last_point, FIRST_STATE + motion.states)
             return REGIME_ENDED
         if motion.may_terminate and motion.termination != CONTINUES:
             return TERMINATED
-        advance_to_step_end(motion, workspace)
-        if urgent == 2 or are_tables_full(
+        move_step_begin_to_step_end(motion, workspace)
+        if urgent == 2 or are_output_tables_nearly_full(
             motion, workspace.event_spec_count, event_table, recording_table
         ):
             copy_values(
@@ -333,7 +339,7 @@ def integrate_one_regime(
             return PAUSED
 
 
-def advance_to_step_end(motion, workspace):
+def move_step_begin_to_step_end(motion, workspace):
     """Copy the end of the step to the beginning of the next step.
 
     Parameters

@@ -14,11 +14,11 @@ import numpy as np
 
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
-    MOTION_VARIABLES,
+    MOTION_VARIABLE_NAMES,
     REGIME_COLUMN,
-    SAMPLE_COLUMN,
+    SAMPLE_NUMBER_COLUMN,
     SAMPLES_PER_STEP,
-    SHEAR_STRESS_COLUMNS,
+    SPRING_AND_FRICTIONAL_STRESS_COLUMNS,
 )
 from rsfstudy.parts import (
     BOUNDARY_PRESSURE_RATE,
@@ -31,15 +31,15 @@ from rsfstudy.parts import (
     SEGMENT_VELOCITY,
     A,
 )
-from rsfstudy.slider import NEGLIGIBLE_SECOND_ORDER_WEIGHT, Numbers, Scene
+from rsfstudy.slider import NEGLIGIBLE_SECOND_ORDER_WEIGHT, FloatTuple, Scene
 
 #: Safety factor of the error estimate. Without the safety factor, the error of friction is up to
 #: 1.4 times the error estimate in random scenes. In these scenes, the thresholds for changes of
 #: regime are three to ten times larger than usual.
 _ERROR_SAFETY_FACTOR = 2.0
 _SLIP_COLUMN, _SLIP_RATE_COLUMN = (
-    MOTION_VARIABLES.index("slip"),
-    MOTION_VARIABLES.index("log10_slip_rate"),
+    MOTION_VARIABLE_NAMES.index("slip"),
+    MOTION_VARIABLE_NAMES.index("log10_slip_rate"),
 )
 
 
@@ -84,12 +84,12 @@ def estimate_neglected_inertia_error(
     norms = scene.inertial_time * np.exp(rates)
     softness = scene.stiffness / scene.a
     on_manifold = recorded_rows[:, REGIME_COLUMN] == slow_regime_number
-    arrives = on_manifold & (recorded_rows[:, SAMPLE_COLUMN] == 0.0)
+    arrives = on_manifold & (recorded_rows[:, SAMPLE_NUMBER_COLUMN] == 0.0)
     slips = softness * np.maximum(norms[1:], norms[:-1]) ** 2 * np.abs(np.diff(rates))
     # Residuals are evaluated at the middle and end of each step and at the beginning of each
     # regime.
     used = np.flatnonzero(
-        on_manifold & (recorded_rows[:, SAMPLE_COLUMN] % (SAMPLES_PER_STEP // 2) == 0.0)
+        on_manifold & (recorded_rows[:, SAMPLE_NUMBER_COLUMN] % (SAMPLES_PER_STEP // 2) == 0.0)
     )
     jumps = np.cumsum(np.where(arrives, slips, 0.0))
     if not used.size:
@@ -124,7 +124,7 @@ def _bound_log_rate_changes_by_residuals(
         np.diff(states)
     ) / scene.a
     # A rupture may separate the first row of a regime from the previous row.
-    ways[recorded_rows[1:, SAMPLE_COLUMN] == 0.0] = 0.0
+    ways[recorded_rows[1:, SAMPLE_NUMBER_COLUMN] == 0.0] = 0.0
     sums = np.append(0.0, np.cumsum(0.5 * (residuals[1:] + residuals[:-1]) * ways))
     found: np.ndarray = np.minimum(np.maximum.accumulate(residuals), sums)
     return found
@@ -141,7 +141,7 @@ def _iterate_equation_of_motion_residuals(
     begins = [begin for begin, _acting, _p in segments]
     for row, norm in zip(recorded_rows, slip_rate_norms.tolist(), strict=True):
         # The last row of a segment and the first row of the next segment have the same time.
-        side = bisect_right if row[SAMPLE_COLUMN] == 0.0 else bisect_left
+        side = bisect_right if row[SAMPLE_NUMBER_COLUMN] == 0.0 else bisect_left
         _begin, acting, p = segments[max(side(begins, row[0]) - 1, 0)]
         load = acting.inertial_time * abs(p[LOAD_VELOCITY])
         weight = acting.stiffness / acting.a * norm * (norm + load)
@@ -153,7 +153,7 @@ def _iterate_equation_of_motion_residuals(
 
 
 def _compute_force_balance_residual(
-    segment_scene: Scene, parameters: Numbers, recorded_row: np.ndarray, inertia_weight: float
+    segment_scene: Scene, parameters: FloatTuple, recorded_row: np.ndarray, inertia_weight: float
 ) -> float:
     """Compute the residual of the equation of motion at a row, divided by a.
 
@@ -161,7 +161,7 @@ def _compute_force_balance_residual(
     """
     equations = segment_scene.equations_against_displacement()
     state = (
-        recorded_row[SHEAR_STRESS_COLUMNS][0] - segment_scene.mu_star,
+        recorded_row[SPRING_AND_FRICTIONAL_STRESS_COLUMNS][0] - segment_scene.mu_star,
         *recorded_row[FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + segment_scene.state_count].tolist(),
     )
     point = equations.point_function(state, equations.rate_function(state, parameters), parameters)
@@ -170,7 +170,7 @@ def _compute_force_balance_residual(
     return abs(missing) / parameters[A]
 
 
-def _iterate_segment_scenes(scene: Scene) -> Iterator[tuple[float, Scene, Numbers]]:
+def _iterate_segment_scenes(scene: Scene) -> Iterator[tuple[float, Scene, FloatTuple]]:
     """Yield the start time, scene and parameters of each loading segment."""
     for acting, table in scene.continuous_segments:
         for n, row in enumerate(table.tolist()):

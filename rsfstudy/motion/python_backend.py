@@ -13,7 +13,7 @@ from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.motion import array_layout
 from rsfstudy.motion.in_place_functions import build_in_place_functions
 from rsfstudy.motion.motion_loop import advance_motion
-from rsfstudy.slider import Equations
+from rsfstudy.slider import EquationsOfMotion
 
 
 class PythonBackend:
@@ -22,7 +22,9 @@ class PythonBackend:
     The class ``compiled.numba_backend.NumbaBackend`` has the same methods.
     """
 
-    def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> dict[str, float]:
+    def pack_initial_motion_state(
+        self, field_values: tuple[tuple[str, float], ...]
+    ) -> dict[str, float]:
         """Return the initial values of all fields of the motion state.
 
         Parameters
@@ -41,7 +43,7 @@ class PythonBackend:
         }
 
     def create_motion_state(
-        self, initial_state: dict[str, float], call_arguments: tuple[float, ...]
+        self, initial_state: dict[str, float], values_set_by_caller: tuple[float, ...]
     ) -> PythonMotionState:
         """Create the state of a motion.
 
@@ -57,10 +59,14 @@ class PythonBackend:
         PythonMotionState
             State of the motion.
         """
-        called = zip(array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER, call_arguments, strict=True)
+        called = zip(
+            array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER, values_set_by_caller, strict=True
+        )
         return PythonMotionState(**{**initial_state, **dict(called)})
 
-    def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
+    def build_function_table(
+        self, equations_by_regime: tuple[EquationsOfMotion, ...]
+    ) -> np.ndarray:
         """Build the function table of the event loop.
 
         Parameters
@@ -81,7 +87,7 @@ class PythonBackend:
         rows[array_layout.FAST_REGIME, -1] = rows[array_layout.SLOW_REGIME, -1]
         return rows
 
-    def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[memoryview]:
+    def convert_arrays_for_motion_loop(self, *arrays: np.ndarray) -> Sequence[memoryview]:
         """Convert arrays to arguments of the event loop.
 
         Parameters
@@ -97,7 +103,7 @@ class PythonBackend:
         """
         return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
-    def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
+    def convert_parameters_for_motion_loop(self, parameters: Sequence[float]) -> Any:
         """Convert the parameters of a scene to an argument of the event loop.
 
         Parameters
@@ -112,7 +118,7 @@ class PythonBackend:
         """
         return list(parameters)
 
-    def get_loop_function(self) -> Any:
+    def get_motion_loop_function(self) -> Any:
         """Return the event loop.
 
         Returns
@@ -128,11 +134,11 @@ class PythonMotionState(SimpleNamespace):
     """State of a motion as a Python object with the fields of ``MOTION_STATE_DTYPE``."""
 
     @property
-    def memory(self) -> list[PythonMotionState]:
+    def motion_state_array(self) -> list[PythonMotionState]:
         """Argument ``motion_memory`` of the event loop."""
         return [self]
 
-    def work_and_row_counters(self) -> tuple[int, ...]:
+    def get_work_and_row_counts(self) -> tuple[int, ...]:
         """Return the counters of evaluations, steps and table rows.
 
         Returns
@@ -146,7 +152,7 @@ class PythonMotionState(SimpleNamespace):
             *(self.event_rows, self.recorded_rows, self.jacobians),
         )
 
-    def set_kinks_ahead(self, count: int) -> None:
+    def set_remaining_kink_count(self, count: int) -> None:
         """Set the number of remaining kinks.
 
         Parameters

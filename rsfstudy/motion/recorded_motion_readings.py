@@ -6,25 +6,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsfstudy.motion.engine_factory import call_array_function_by_engine
+from rsfstudy.motion.engine_factory import call_array_function_with_engine
 from rsfstudy.motion.engines import SCIPY
 from rsfstudy.motion.recording import (
-    MOTION_VARIABLES,
-    SAMPLE_COLUMN,
+    MOTION_VARIABLE_NAMES,
+    SAMPLE_NUMBER_COLUMN,
     SAMPLES_PER_STEP,
     resample_along_path,
 )
 
 #: Columns of a recorded motion. The path length is computed from these columns.
 _COLUMNS_DEFINING_PATH_LENGTH = tuple(
-    MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
+    MOTION_VARIABLE_NAMES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
 )
 
 
 def resample_motion_along_path(
-    motion_table: np.ndarray,
+    recorded_rows: np.ndarray,
     point_count: int,
-    variable_names: Sequence[str] = MOTION_VARIABLES,
+    variable_names: Sequence[str] = MOTION_VARIABLE_NAMES,
     engine: str = SCIPY,
 ) -> dict[str, np.ndarray]:
     """Resample a recorded motion at points along its path.
@@ -49,19 +49,19 @@ def resample_motion_along_path(
     dict of str to ndarray
         Values of each variable at the points. The values are NaN if the table is empty.
     """
-    if not len(motion_table):
+    if not len(recorded_rows):
         return {name: np.full(point_count, np.nan) for name in variable_names}
     columns, found = (
-        np.ascontiguousarray(motion_table.T),
+        np.ascontiguousarray(recorded_rows.T),
         np.empty((len(variable_names), point_count)),
     )
     path, at, room = (
-        np.zeros(len(motion_table)),
+        np.zeros(len(recorded_rows)),
         np.empty(point_count),
         np.empty(SAMPLES_PER_STEP + 1),
     )
-    seen = [columns[place] for place in (*_COLUMNS_DEFINING_PATH_LENGTH, SAMPLE_COLUMN)]
-    call_array_function_by_engine(
+    seen = [columns[place] for place in (*_COLUMNS_DEFINING_PATH_LENGTH, SAMPLE_NUMBER_COLUMN)]
+    call_array_function_with_engine(
         resample_along_path, engine, columns, *seen, path, at, room, found
     )
     # Interpolation can make times decrease within a rupture because of rounding errors.

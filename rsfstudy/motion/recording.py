@@ -19,7 +19,7 @@ from rsfstudy.motion.events import Event
 from rsfstudy.slider import MotionPoint, Scene
 
 #: Names of the first columns of a recorded motion.
-MOTION_VARIABLES = (
+MOTION_VARIABLE_NAMES = (
     "time",
     "slip",
     "log10_slip_rate",
@@ -29,16 +29,17 @@ MOTION_VARIABLES = (
     "state_variable",
 )
 #: Columns of the spring stress and the frictional stress in a recorded motion.
-SHEAR_STRESS_COLUMNS = slice(
-    MOTION_VARIABLES.index("shear_stress"), MOTION_VARIABLES.index("frictional_stress") + 1
+SPRING_AND_FRICTIONAL_STRESS_COLUMNS = slice(
+    MOTION_VARIABLE_NAMES.index("shear_stress"),
+    MOTION_VARIABLE_NAMES.index("frictional_stress") + 1,
 )
 #: Names of all recorded variables. The last variable is the apparent friction that a rig measures.
-RECORDED_VARIABLES = (*MOTION_VARIABLES, "friction_coefficient")
+RECORDED_VARIABLE_NAMES = (*MOTION_VARIABLE_NAMES, "friction_coefficient")
 #: Columns after the recorded variables: the regime, the sample number within the step, and the
 #: first state. The sample number is 0 at the beginning of a regime and ``SAMPLES_PER_STEP`` at the
 #: end of each step.
-REGIME_COLUMN, SAMPLE_COLUMN, FIRST_STATE_COLUMN = range(
-    len(RECORDED_VARIABLES), len(RECORDED_VARIABLES) + 3
+REGIME_COLUMN, SAMPLE_NUMBER_COLUMN, FIRST_STATE_COLUMN = range(
+    len(RECORDED_VARIABLE_NAMES), len(RECORDED_VARIABLE_NAMES) + 3
 )
 #: Number of samples per integration step. With this number of samples, the interpolating polynomial
 #: looks smooth in plots.
@@ -61,19 +62,19 @@ class Recording:
     """
 
     #: Names of the first columns of a recorded motion, and of all recorded variables.
-    MOTION_VARIABLES: ClassVar = MOTION_VARIABLES
-    VARIABLES: ClassVar = RECORDED_VARIABLES
+    MOTION_VARIABLE_NAMES: ClassVar = MOTION_VARIABLE_NAMES
+    VARIABLE_NAMES: ClassVar = RECORDED_VARIABLE_NAMES
     #: Columns after the recorded variables.
     REGIME_COLUMN: ClassVar = REGIME_COLUMN
-    SAMPLE_COLUMN: ClassVar = SAMPLE_COLUMN
+    SAMPLE_NUMBER_COLUMN: ClassVar = SAMPLE_NUMBER_COLUMN
     FIRST_STATE_COLUMN: ClassVar = FIRST_STATE_COLUMN
 
     regime_names: list[str] = field(default_factory=list)
     sample_times: np.ndarray | None = None
     _row_blocks: list[np.ndarray] = field(default_factory=list)
-    _block_count_with_clipped_times: int = 0
+    _block_count_with_capped_times: int = 0
 
-    def index_of_regime(self, regime_name: str) -> int:
+    def get_or_add_regime_index(self, regime_name: str) -> int:
         """Return the index of a regime, and add new regimes to the list.
 
         Parameters
@@ -90,7 +91,7 @@ class Recording:
             self.regime_names.append(regime_name)
         return self.regime_names.index(regime_name)
 
-    def remaining_sample_times(self) -> np.ndarray:
+    def list_unrecorded_sample_times(self) -> np.ndarray:
         """Return the requested times that have not been recorded yet.
 
         Returns
@@ -113,14 +114,14 @@ class Recording:
         """
         if self.sample_times is not None and not np.isnan(rows[0, 0]):
             rows[:, 0] = self.sample_times[
-                len(self.sample_times) - len(self.remaining_sample_times()) :
+                len(self.sample_times) - len(self.list_unrecorded_sample_times()) :
             ][: len(rows)]
-        numbers = [self.index_of_regime(name) for name in regime_names]
+        numbers = [self.get_or_add_regime_index(name) for name in regime_names]
         if numbers != list(range(len(numbers))):
             rows[:, REGIME_COLUMN] = np.array(numbers)[rows[:, REGIME_COLUMN].astype(int)]
         self._row_blocks.append(rows)
 
-    def clip_recorded_times(self, max_time: float) -> None:
+    def cap_recorded_times_at(self, end_time: float) -> None:
         """Limit the recorded times of a segment chain to the end time of the chain.
 
         Parameters
@@ -130,11 +131,11 @@ class Recording:
         """
         if self.sample_times is not None:
             return
-        for rows in self._row_blocks[self._block_count_with_clipped_times :]:
-            np.minimum(rows[:, 0], max_time, out=rows[:, 0])
-        if self._block_count_with_clipped_times < len(self._row_blocks):
-            self._row_blocks[-1][-1:, 0] = max_time
-        self._block_count_with_clipped_times = len(self._row_blocks)
+        for rows in self._row_blocks[self._block_count_with_capped_times :]:
+            np.minimum(rows[:, 0], end_time, out=rows[:, 0])
+        if self._block_count_with_capped_times < len(self._row_blocks):
+            self._row_blocks[-1][-1:, 0] = end_time
+        self._block_count_with_capped_times = len(self._row_blocks)
 
     def as_table(self, scene: Scene, end_event: Event | None = None) -> np.ndarray:
         """Return the recorded motion as a table.
@@ -156,16 +157,16 @@ class Recording:
         columns = min(part.shape[1] for part in rows)
         table = np.concatenate([part[:, :columns] for part in rows])
         if end_event is not None:
-            last = pack_recorded_row(
+            last = pack_point_into_recording_row(
                 end_event.time,
                 end_event.slip,
                 end_event.point,
-                self.index_of_regime(end_event.regime),
+                self.get_or_add_regime_index(end_event.regime),
             )
             table = truncate_recording_at_row(table, np.array(last[:columns]))
-        return convert_to_recorded_units(scene, table)
+        return convert_recorded_rows_to_output_units(scene, table)
 
-    def table_up_to_row(self, scene: Scene, last_row: np.ndarray) -> np.ndarray:
+    def as_table_up_to_row(self, scene: Scene, last_row: np.ndarray) -> np.ndarray:
         """Return the recorded motion up to a row within an integration step.
 
         Parameters
@@ -183,8 +184,8 @@ class Recording:
         return truncate_recording_at_row(self.as_table(scene), last_row)
 
     @staticmethod
-    def row_at_point(
-        scene: Scene, time: float, slip: float, point: MotionPoint, regime: int
+    def convert_point_to_row(
+        scene: Scene, time: float, slip: float, point: MotionPoint, regime_index: int
     ) -> np.ndarray:
         """Convert a point of the motion to a row of ``Recording.as_table``.
 
@@ -204,12 +205,12 @@ class Recording:
         ndarray
             Row in the units of recorded motions. The sample number of the row is 0.
         """
-        return convert_to_recorded_units(
-            scene, np.array(pack_recorded_row(time, slip, point, regime))
+        return convert_recorded_rows_to_output_units(
+            scene, np.array(pack_point_into_recording_row(time, slip, point, regime_index))
         )
 
     @staticmethod
-    def friction_coefficient(motion_table: np.ndarray) -> np.ndarray:
+    def get_friction_coefficient(recorded_rows: np.ndarray) -> np.ndarray:
         """Return the apparent friction coefficient along a recorded motion.
 
         Parameters
@@ -222,10 +223,10 @@ class Recording:
         ndarray
             Friction coefficient of each row.
         """
-        return motion_table[:, RECORDED_VARIABLES.index("friction_coefficient")]
+        return recorded_rows[:, RECORDED_VARIABLE_NAMES.index("friction_coefficient")]
 
     @staticmethod
-    def load_point_displacement(scene: Scene, motion_table: np.ndarray) -> np.ndarray:
+    def compute_load_point_displacement(scene: Scene, recorded_rows: np.ndarray) -> np.ndarray:
         """Compute the load point displacement along a recorded motion.
 
         The displacement is the sum of the slip and the elongation of the spring. The displacement
@@ -244,12 +245,12 @@ class Recording:
             Displacement of each row, in D_c.
         """
         longer = (
-            motion_table[:, MOTION_VARIABLES.index("shear_stress")] - scene.mu_star
+            recorded_rows[:, MOTION_VARIABLE_NAMES.index("shear_stress")] - scene.mu_star
         ) / scene.stiffness
-        return np.asarray(motion_table[:, MOTION_VARIABLES.index("slip")] + longer)
+        return np.asarray(recorded_rows[:, MOTION_VARIABLE_NAMES.index("slip")] + longer)
 
 
-def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
+def convert_recorded_rows_to_output_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
     """Convert recorded rows in place from event loop units to output units.
 
     Natural logarithms of slip rates are converted to decimal logarithms, and stress deviations are
@@ -268,11 +269,11 @@ def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
         The array ``rows``.
     """
     rows[..., 2] /= math.log(10.0)
-    rows[..., SHEAR_STRESS_COLUMNS] += scene.mu_star
+    rows[..., SPRING_AND_FRICTIONAL_STRESS_COLUMNS] += scene.mu_star
     return rows
 
 
-def pack_recorded_row(
+def pack_point_into_recording_row(
     time: float, slip: float, point: MotionPoint, regime_number: int
 ) -> tuple[float, ...]:
     """Convert a point of the motion to a row of the recording table.
@@ -298,7 +299,7 @@ def pack_recorded_row(
     )
 
 
-def truncate_recording_at_row(motion_table: np.ndarray, last_row: np.ndarray) -> np.ndarray:
+def truncate_recording_at_row(recorded_rows: np.ndarray, last_row: np.ndarray) -> np.ndarray:
     """Truncate a recorded motion at a row within an integration step.
 
     The samples of the truncated step are replaced by evenly spaced samples up to the last row. The
@@ -316,26 +317,30 @@ def truncate_recording_at_row(motion_table: np.ndarray, last_row: np.ndarray) ->
     ndarray
         Truncated motion.
     """
-    after = int(motion_table[:, 0].searchsorted(last_row[0]))
-    place = int(motion_table[after, SAMPLE_COLUMN]) if after < len(motion_table) else 0
+    after = int(recorded_rows[:, 0].searchsorted(last_row[0]))
+    place = int(recorded_rows[after, SAMPLE_NUMBER_COLUMN]) if after < len(recorded_rows) else 0
     begin = after - place
     # If the recording ends before the end of the step, no samples need to be replaced.
-    if not place or begin + SAMPLES_PER_STEP >= len(motion_table):
-        return np.vstack([motion_table[:after], last_row])
-    part, times = float(place), motion_table[begin : begin + SAMPLES_PER_STEP + 1, 0]
+    if not place or begin + SAMPLES_PER_STEP >= len(recorded_rows):
+        return np.vstack([recorded_rows[:after], last_row])
+    part, times = float(place), recorded_rows[begin : begin + SAMPLES_PER_STEP + 1, 0]
     if times[place] > last_row[0] > times[place - 1]:
-        late = (_INVERSE_VANDERMONDE @ (times - last_row[0])).tolist()
+        late = (_INVERSE_VANDERMONDE_MATRIX @ (times - last_row[0])).tolist()
         sides = (place - 1.0) / HALF_SAMPLES - 1.0, place / HALF_SAMPLES - 1.0
         if _evaluate_polynomial(sides[0], late) < 0.0 < _evaluate_polynomial(sides[1], late):
             part = HALF_SAMPLES * (1.0 + brentq(_evaluate_polynomial, *sides, args=(late,)))
     within = part / SAMPLES_PER_STEP * _SAMPLE_INDICES[1:-1]
-    step = motion_table[begin + 1 : begin + SAMPLES_PER_STEP + 1]
+    step = recorded_rows[begin + 1 : begin + SAMPLES_PER_STEP + 1]
     step[:-1], step[-1] = (
-        _interpolation_weights(within).T @ motion_table[begin : begin + SAMPLES_PER_STEP + 1],
+        _compute_interpolation_weights(within).T
+        @ recorded_rows[begin : begin + SAMPLES_PER_STEP + 1],
         last_row,
     )
-    step[:, REGIME_COLUMN], step[:, SAMPLE_COLUMN] = last_row[REGIME_COLUMN], _SAMPLE_INDICES[1:]
-    return motion_table[: begin + SAMPLES_PER_STEP + 1]
+    step[:, REGIME_COLUMN], step[:, SAMPLE_NUMBER_COLUMN] = (
+        last_row[REGIME_COLUMN],
+        _SAMPLE_INDICES[1:],
+    )
+    return recorded_rows[: begin + SAMPLES_PER_STEP + 1]
 
 
 def resample_along_path(  # type: ignore[no-untyped-def]
@@ -407,12 +412,14 @@ def resample_along_path(  # type: ignore[no-untyped-def]
             elif values[i] < values[bottom]:
                 bottom = i
         move_nearest_row_position_to(
-            row_positions, find_extreme_position(values, step_sample_numbers, top, work_array)
+            row_positions,
+            find_fractional_row_of_extremum(values, step_sample_numbers, top, work_array),
         )
         move_nearest_row_position_to(
-            row_positions, find_extreme_position(values, step_sample_numbers, bottom, work_array)
+            row_positions,
+            find_fractional_row_of_extremum(values, step_sample_numbers, bottom, work_array),
         )
-    interpolate_rows(columns, row_positions, result)
+    interpolate_at_fractional_rows(columns, row_positions, result)
 
 
 def move_nearest_row_position_to(row_positions: Any, row_position: float) -> None:
@@ -434,8 +441,8 @@ def move_nearest_row_position_to(row_positions: Any, row_position: float) -> Non
         row_positions[nearest] = row_position
 
 
-def find_extreme_position(
-    values: Any, step_sample_numbers: Any, extreme_row: int, work_array: Any
+def find_fractional_row_of_extremum(
+    column_values: Any, step_sample_numbers: Any, extreme_row: int, work_array: Any
 ) -> float:
     """Find the fractional row number of an extremum.
 
@@ -463,14 +470,14 @@ def find_extreme_position(
         extreme_row,
         extreme_row + 1,
     ):  # The row belongs to the first step, and the second step may begin at the row.
-        begin = after - int(step_sample_numbers[after]) if after < len(values) else after
-        if begin == after or begin + SAMPLES_PER_STEP >= len(values):
+        begin = after - int(step_sample_numbers[after]) if after < len(column_values) else after
+        if begin == after or begin + SAMPLES_PER_STEP >= len(column_values):
             continue
         for power in range(SAMPLES_PER_STEP + 1):
             work_array[power] = 0.0
             for k in range(SAMPLES_PER_STEP + 1):
-                work_array[power] += INTERPOLATION_COEFFICIENTS[power][k] * (
-                    values[begin + k] - values[extreme_row]
+                work_array[power] += SAMPLE_INTERPOLATION_COEFFICIENTS[power][k] * (
+                    column_values[begin + k] - column_values[extreme_row]
                 )
         at = (extreme_row - begin) / HALF_SAMPLES - 1.0
         for _ in range(4):
@@ -486,7 +493,9 @@ def find_extreme_position(
     return float(extreme_row)
 
 
-def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.ndarray) -> None:
+def interpolate_at_fractional_rows(
+    columns: np.ndarray, row_positions: np.ndarray, result: np.ndarray
+) -> None:
     """Interpolate columns at fractional row numbers.
 
     Within a step, the function evaluates the polynomial through the samples of the step. Between
@@ -505,7 +514,7 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     """
     columns, row_positions, result = map(np.asarray, (columns, row_positions, result))
     after = np.ceil(row_positions).astype(int)
-    within = columns[SAMPLE_COLUMN, after].astype(int)
+    within = columns[SAMPLE_NUMBER_COLUMN, after].astype(int)
     # Between two regimes, the interpolation is linear.
     jumps = np.flatnonzero((within == 0) & (row_positions > 0.0))
     within[jumps] = 1
@@ -513,7 +522,7 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     part = row_positions - begin
     columns = columns[: len(result)]
     around = columns.take(begin + _SAMPLE_INDICES[:, None], axis=1, mode="clip")
-    np.einsum("kp,ckp->cp", _interpolation_weights(part), around, out=result)
+    np.einsum("kp,ckp->cp", _compute_interpolation_weights(part), around, out=result)
     at_a_row = np.flatnonzero(part == np.rint(part))
     result[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
     line, share = begin[jumps], part[jumps]
@@ -524,10 +533,12 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
 #: beginning of the step and 1 at its end. ``INTERPOLATION_COEFFICIENTS[power][k]`` is the
 #: contribution of sample ``k`` to the coefficient of ``power``.
 HALF_SAMPLES, _SAMPLE_INDICES = 0.5 * SAMPLES_PER_STEP, np.arange(SAMPLES_PER_STEP + 1)
-_INVERSE_VANDERMONDE = np.linalg.inv(
+_INVERSE_VANDERMONDE_MATRIX = np.linalg.inv(
     np.vander(np.linspace(-1.0, 1.0, SAMPLES_PER_STEP + 1), increasing=True)
 )
-INTERPOLATION_COEFFICIENTS = tuple(tuple(row) for row in _INVERSE_VANDERMONDE.tolist())
+SAMPLE_INTERPOLATION_COEFFICIENTS = tuple(
+    tuple(row) for row in _INVERSE_VANDERMONDE_MATRIX.tolist()
+)
 
 
 def _evaluate_polynomial(x: float, coefficients: Sequence[float]) -> float:
@@ -538,8 +549,9 @@ def _evaluate_polynomial(x: float, coefficients: Sequence[float]) -> float:
     return value
 
 
-def _interpolation_weights(step_positions: np.ndarray) -> np.ndarray:
+def _compute_interpolation_weights(positions_within_step: np.ndarray) -> np.ndarray:
     """Compute the interpolation weights of the samples of a step, one row per sample."""
     return np.asarray(
-        _INVERSE_VANDERMONDE.T @ (step_positions / HALF_SAMPLES - 1.0) ** _SAMPLE_INDICES[:, None]
+        _INVERSE_VANDERMONDE_MATRIX.T
+        @ (positions_within_step / HALF_SAMPLES - 1.0) ** _SAMPLE_INDICES[:, None]
     )

@@ -16,8 +16,8 @@ from rsfstudy.motion.array_layout import (
     SPRING_STRESS,
 )
 from rsfstudy.motion.array_operations import copy_values, evaluate_function_into_array
-from rsfstudy.motion.regime_switching import starts_on_slow_manifold
-from rsfstudy.motion.step_integration import slip_since_start
+from rsfstudy.motion.regime_switching import can_start_on_slow_manifold
+from rsfstudy.motion.step_integration import compute_slip_since_motion_start
 from rsfstudy.parts import (
     BOUNDARY_PRESSURE_RATE,
     LAW,
@@ -61,7 +61,7 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
         FIRST_STATE + motion.states - 1 - motion.unknowns_behind_fluid,
     )
     copy_values(workspace.point_at_end, last_point, FIRST_STATE + motion.states)
-    motion.slip = slip_since_start(
+    motion.slip = compute_slip_since_motion_start(
         motion, motion.end, motion.end_time, last_point[SPRING_STRESS], p
     )
     motion.spring_stress, motion.time, motion.regime_start_time = (
@@ -117,7 +117,7 @@ def enter_initial_regime(
         Parameters of the scene.
     """
     motion.starts_at_point, motion.regime = 0, SLOW_REGIME
-    set_unknowns_of_regime(motion, y, last_point)
+    set_initial_unknowns_of_regime(motion, y, last_point)
     if motion.has_mass:
         evaluate_function_into_array(
             functions[SLOW_REGIME, FUNCTION_COUNT_PER_REGIME - 1],
@@ -126,17 +126,17 @@ def enter_initial_regime(
             parameters,
             slow_manifold_values,
         )
-        if not starts_on_slow_manifold(
+        if not can_start_on_slow_manifold(
             last_point[LOG_SLIP_RATE],
             slow_manifold_values[0],
             last_point[SPRING_STRESS] - slow_manifold_values[1],
             switch_thresholds,
         ):
             motion.regime = FAST_REGIME
-            set_unknowns_of_regime(motion, y, last_point)
+            set_initial_unknowns_of_regime(motion, y, last_point)
 
 
-def set_unknowns_of_regime(motion, y, last_point):
+def set_initial_unknowns_of_regime(motion, y, last_point):
     """Set the unknowns of a regime from the last point of the previous regime.
 
     A change of regime does not change spring stress, states and time. If the new regime is the slow

@@ -32,15 +32,15 @@ MIN_POSITIVE_NORMAL_STRESS = 1e-300
 #: Upper limit of ln(V/V_*) without inertia. The slip rate is unbounded above 10^120 V_*.
 MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
 #: Limits of ln(V/V_*). They are constants of this module because compiled functions read them.
-LARGEST_LOG_SLIP_RATE = Scene.LARGEST_LOG_SLIP_RATE
-STOPPED_LOG_SLIP_RATE = Scene.STOPPED_LOG_SLIP_RATE
+LARGEST_LOG_SLIP_RATE = Scene.LOG_SLIP_RATE_UPPER_LIMIT
+STOPPED_LOG_SLIP_RATE = Scene.LOG_SLIP_RATE_OF_STOPPED_SLIP
 #: Codes for the termination status of a motion.
 CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_RATE_UNBOUNDED = (
     range(5)
 )
 
 
-class SwitchThresholds(NamedTuple):
+class RegimeSwitchThresholds(NamedTuple):
     r"""Thresholds for changes between the slow manifold and inertial equations.
 
     Parameters
@@ -60,8 +60,8 @@ class SwitchThresholds(NamedTuple):
     """
 
     max_slip_rate_norm: float
-    max_inertia_correction: float
-    max_remaining_slip: float
+    max_log_rate_change_by_inertia: float
+    max_slip_in_return_to_slow_manifold: float
     stiffness_over_a: float
     a: float
     inertial_time: float
@@ -69,11 +69,13 @@ class SwitchThresholds(NamedTuple):
 
 #: Thresholds of a motion without inertia. The event loop does not use the values of these
 #: thresholds.
-UNUSED_SWITCH_THRESHOLDS = SwitchThresholds(*[math.nan] * len(SwitchThresholds._fields))
+SWITCH_THRESHOLDS_WITHOUT_INERTIA = RegimeSwitchThresholds(
+    *[math.nan] * len(RegimeSwitchThresholds._fields)
+)
 
 
 @cached_per_scene
-def compute_switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresholds:
+def compute_regime_switch_thresholds(scene: Scene, accuracy: Accuracy) -> RegimeSwitchThresholds:
     """Compute the thresholds of a scene for a requested accuracy.
 
     Parameters
@@ -89,19 +91,21 @@ def compute_switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresho
         Thresholds. All values are NaN if the scene has no inertia.
     """
     if not scene.has_mass:
-        return UNUSED_SWITCH_THRESHOLDS
+        return SWITCH_THRESHOLDS_WITHOUT_INERTIA
     softness = scene.stiffness / scene.a
-    return SwitchThresholds(
-        math.sqrt(accuracy.max_inertia_weight / softness),
-        accuracy.max_inertia_correction,
-        accuracy.max_remaining_slip,
+    return RegimeSwitchThresholds(
+        math.sqrt(accuracy.max_inertia_weight_on_slow_manifold / softness),
+        accuracy.max_log_rate_change_by_inertia,
+        accuracy.max_slip_in_return_to_slow_manifold,
         softness,
         scene.a,
         scene.inertial_time,
     )
 
 
-def compute_slip_rate_norm(log_slip_rate: float, switch_thresholds: SwitchThresholds) -> float:
+def compute_slip_rate_norm(
+    log_slip_rate: float, switch_thresholds: RegimeSwitchThresholds
+) -> float:
     r"""Compute the dimensionless slip rate norm.
 
     Parameters
@@ -120,7 +124,7 @@ def compute_slip_rate_norm(log_slip_rate: float, switch_thresholds: SwitchThresh
 
 
 def compute_inertia_effect_over_limit(
-    log_slip_rate: float, inertial_stress: float, switch_thresholds: SwitchThresholds
+    log_slip_rate: float, inertial_stress: float, switch_thresholds: RegimeSwitchThresholds
 ) -> float:
     r"""Compute the effect of inertia, divided by its limit on the slow manifold.
 
@@ -141,7 +145,9 @@ def compute_inertia_effect_over_limit(
         result is 1 or larger.
     """
     correction = (
-        abs(inertial_stress) / switch_thresholds.a / switch_thresholds.max_inertia_correction
+        abs(inertial_stress)
+        / switch_thresholds.a
+        / switch_thresholds.max_log_rate_change_by_inertia
     )
     return max(
         compute_slip_rate_norm(log_slip_rate, switch_thresholds)
@@ -171,12 +177,14 @@ def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> 
     if not scene.has_mass:
         return False
     inertial_stress = point.spring_stress - point.frictional_stress
-    given = compute_switch_thresholds(scene, accuracy)
+    given = compute_regime_switch_thresholds(scene, accuracy)
     return compute_inertia_effect_over_limit(point.log_slip_rate, inertial_stress, given) >= 1.0
 
 
-def slip_during_transition(
-    initial_log_slip_rate: float, final_log_slip_rate: float, switch_thresholds: SwitchThresholds
+def compute_slip_during_transition(
+    initial_log_slip_rate: float,
+    final_log_slip_rate: float,
+    switch_thresholds: RegimeSwitchThresholds,
 ) -> float:
     r"""Compute the slip during a transition between two slip rates.
 
@@ -212,11 +220,11 @@ def slip_during_transition(
     )
 
 
-def starts_on_slow_manifold(
+def can_start_on_slow_manifold(
     log_slip_rate: float,
     manifold_log_slip_rate: float,
     inertial_stress: float,
-    switch_thresholds: SwitchThresholds,
+    switch_thresholds: RegimeSwitchThresholds,
 ) -> bool:
     r"""Return True if a motion can start on the slow manifold.
 
@@ -252,13 +260,13 @@ def starts_on_slow_manifold(
     )
     return (
         slow
-        and slip_during_transition(log_slip_rate, manifold_log_slip_rate, switch_thresholds)
-        <= switch_thresholds.max_remaining_slip
+        and compute_slip_during_transition(log_slip_rate, manifold_log_slip_rate, switch_thresholds)
+        <= switch_thresholds.max_slip_in_return_to_slow_manifold
     )
 
 
 def is_slip_slow_enough_for_slow_manifold(
-    log_slip_rate: float, switch_thresholds: SwitchThresholds
+    log_slip_rate: float, switch_thresholds: RegimeSwitchThresholds
 ) -> bool:
     r"""Return True if the slip rate is small enough for the slow manifold.
 
@@ -288,7 +296,7 @@ def should_switch_back_to_slow_manifold(
     log_slip_rate_growth: float,
     manifold_log_slip_rate: float,
     inertial_stress: float,
-    switch_thresholds: SwitchThresholds,
+    switch_thresholds: RegimeSwitchThresholds,
 ) -> bool:
     r"""Return True if a motion in a rupture can return to the slow manifold.
 
@@ -335,9 +343,13 @@ def should_switch_back_to_slow_manifold(
     )
     has_peak = (
         inertial_stress < 0.0
-        and switch_thresholds.stiffness_over_a * norm**2 > switch_thresholds.max_remaining_slip
+        and switch_thresholds.stiffness_over_a * norm**2
+        > switch_thresholds.max_slip_in_return_to_slow_manifold
     )
-    has_trough = inertial_stress > 0.1 * switch_thresholds.max_remaining_slip * switch_thresholds.a
+    has_trough = (
+        inertial_stress
+        > 0.1 * switch_thresholds.max_slip_in_return_to_slow_manifold * switch_thresholds.a
+    )
     if (
         log_slip_rate_growth > 0.0 and (log_slip_rate > manifold_log_slip_rate + 1.0 or has_peak)
     ) or (log_slip_rate_growth < 0.0 and has_trough):
@@ -357,7 +369,7 @@ def should_switch_back_to_slow_manifold(
         )
         < 0.5
     )
-    return settled and remaining < switch_thresholds.max_remaining_slip
+    return settled and remaining < switch_thresholds.max_slip_in_return_to_slow_manifold
 
 
 def find_termination_status(

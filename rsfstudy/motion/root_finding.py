@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.slider import Function
+from rsfstudy.slider import NumericFunction
 
 _MAX_BRENT_ITERATIONS = 100
 
 
-def build_root_finder(function: Function) -> Function:
+def build_root_finder(function: NumericFunction) -> NumericFunction:
     """Build a function that finds a root of another function.
 
     Parameters
@@ -48,7 +48,9 @@ def build_root_finder(function: Function) -> Function:
                 return best
             tried = half
             if abs(earlier) > enough and abs(at_best) < abs(at_latest):
-                tried = root_interpolation_step(latest, best, other, at_latest, at_best, at_other)
+                tried = compute_root_interpolation_step(
+                    latest, best, other, at_latest, at_best, at_other
+                )
                 if not 2.0 * abs(tried) < min(abs(earlier), 3.0 * abs(half) - enough):
                     tried = move = half
             else:
@@ -62,8 +64,13 @@ def build_root_finder(function: Function) -> Function:
     return root
 
 
-def root_interpolation_step(
-    previous: float, best: float, other: float, at_previous: float, at_best: float, at_other: float
+def compute_root_interpolation_step(
+    previous: float,
+    best: float,
+    other: float,
+    value_at_previous: float,
+    value_at_best: float,
+    value_at_other: float,
 ) -> float:
     """Compute the distance from the best estimate of a root to the next estimate.
 
@@ -83,8 +90,10 @@ def root_interpolation_step(
         Signed distance from ``best`` to the next estimate of the root.
     """
     if previous == other:
-        return -at_best * (best - previous) / (at_best - at_previous)
-    to_latest = (at_previous - at_best) / (previous - best)
-    to_other = (at_other - at_best) / (other - best)
-    numerator = at_other * to_other - at_previous * to_latest
-    return -at_best * numerator / (to_other * to_latest * (at_other - at_previous))
+        return -value_at_best * (best - previous) / (value_at_best - value_at_previous)
+    to_latest = (value_at_previous - value_at_best) / (previous - best)
+    to_other = (value_at_other - value_at_best) / (other - best)
+    numerator = value_at_other * to_other - value_at_previous * to_latest
+    return (
+        -value_at_best * numerator / (to_other * to_latest * (value_at_other - value_at_previous))
+    )

@@ -9,7 +9,7 @@ import numpy as np
 
 from rsfstudy.motion.event_spec_table import find_events_at_jump
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
-from rsfstudy.motion.initial_points import point_after_loading_jump
+from rsfstudy.motion.initial_points import compute_point_after_loading_jump
 from rsfstudy.parts import (
     LOADING,
     SEGMENT_END,
@@ -18,10 +18,10 @@ from rsfstudy.parts import (
     SEGMENT_STRESS_FALL,
     SEGMENT_STRESS_RATE,
 )
-from rsfstudy.slider import SINGLE_ENDLESS_SEGMENT_TABLE, MotionPoint, Numbers, Scene
+from rsfstudy.slider import SINGLE_ENDLESS_SEGMENT_TABLE, FloatTuple, MotionPoint, Scene
 
 
-def list_segment_chains(
+def split_segments_at_stress_jumps(
     scene: Scene, *, only_last_segment: bool
 ) -> Sequence[tuple[Scene, np.ndarray]]:
     """Split the loading segments of a scene into chains.
@@ -44,8 +44,8 @@ def list_segment_chains(
     return scene.continuous_segments
 
 
-def find_remaining_segment_chains(
-    scene: Scene, resume_from: Event
+def find_segments_left_to_integrate(
+    scene: Scene, last_event: Event
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
     """Return the segment chains that remain when a motion is resumed.
 
@@ -65,22 +65,22 @@ def find_remaining_segment_chains(
     point : MotionPoint
         Point at which the motion continues.
     """
-    first, point, left = 0, resume_from.point, []
+    first, point, left = 0, last_event.point, []
     for acting, table in scene.continuous_segments:
-        number = int(np.searchsorted(table[:, SEGMENT_START], resume_from.time, side="right")) - 1
+        number = int(np.searchsorted(table[:, SEGMENT_START], last_event.time, side="right")) - 1
         if number > 0:
             acting = scene.segment_scene(first + number)
-        if first and number == 0 and table[0, SEGMENT_START] == resume_from.time:
-            point = point_after_loading_jump(acting, point)
+        if first and number == 0 and table[0, SEGMENT_START] == last_event.time:
+            point = compute_point_after_loading_jump(acting, point)
         rest = table[max(number, 0) :].copy()
-        rest[0, SEGMENT_START] = max(rest[0, SEGMENT_START], resume_from.time)
-        if rest[-1, SEGMENT_END] > resume_from.time:
+        rest[0, SEGMENT_START] = max(rest[0, SEGMENT_START], last_event.time)
+        if rest[-1, SEGMENT_END] > last_event.time:
             left.append((acting, rest))
         first += len(table)
     return left, point
 
 
-def truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndarray:
+def truncate_segment_table_at_time(segment_table: np.ndarray, end_time: float) -> np.ndarray:
     """Return the loading segments of a chain up to an end time.
 
     Parameters
@@ -103,9 +103,9 @@ def truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndarr
     return cut
 
 
-def begin_noise(
-    scene: Scene, start: MotionPoint, segment_table: np.ndarray
-) -> tuple[MotionPoint, Numbers, np.ndarray, Iterator[np.ndarray]]:
+def prepare_segment_with_noise(
+    scene: Scene, start_point: MotionPoint, segment_table: np.ndarray
+) -> tuple[MotionPoint, FloatTuple, np.ndarray, Iterator[np.ndarray]]:
     """Return the initial values and the segment tables of a segment with noise.
 
     Parameters
@@ -129,19 +129,21 @@ def begin_noise(
         Further blocks of the segment table.
     """
     begin, end = (float(segment_table[0, column]) for column in (SEGMENT_START, SEGMENT_END))
-    tables = scene.parts.loading_noise.iterate_segments(begin, end, scene.load_velocity)
+    tables = scene.parts.loading_noise.iterate_segment_table_blocks(begin, end, scene.load_velocity)
     table = next(tables)
     parameters = list(scene.parameter_values)
     parameters[-1] = float(table[0, SEGMENT_NOISE_RATE])
     if scene.parts.loading_noise.unknowns:
         parameters[LOADING] = float(table[0, SEGMENT_STRESS_RATE])
-        start = start._replace(psis=(*start.psis[:-1], float(table[0, SEGMENT_STRESS_FALL])))
-    return start, tuple(parameters), table, tables
+        start_point = start_point._replace(
+            psis=(*start_point.psis[:-1], float(table[0, SEGMENT_STRESS_FALL]))
+        )
+    return start_point, tuple(parameters), table, tables
 
 
 def iterate_segment_start_events(
     event: Event,
-    point_and_parameters_before: tuple[MotionPoint, Numbers],
+    point_and_parameters_before: tuple[MotionPoint, FloatTuple],
     segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
@@ -167,7 +169,7 @@ def iterate_segment_start_events(
     Event
         Events at the start of the chain.
     """
-    yield event._replace(kind=EventKind.SEGMENT)
+    yield event._replace(kind=EventKind.SEGMENT_START)
     for spec, point in find_events_at_jump(
         *point_and_parameters_before, event.point, segment_scene.parameter_values, event_specs
     ):
@@ -175,12 +177,12 @@ def iterate_segment_start_events(
         yield event._replace(kind=spec.kind, specification=spec, point=point)
 
 
-def select_event_specs(
+def select_possible_event_specs(
     scene: Scene,
-    chain_scene: Scene,
+    first_segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
     *,
-    is_last_chain: bool,
+    includes_last_segment: bool,
 ) -> Sequence[EventSpecification]:
     """Select the requested events that can occur in a segment chain.
 
@@ -205,8 +207,8 @@ def select_event_specs(
         Events to detect.
     """
     settling = [spec for spec in event_specs if spec.kind is EventKind.SETTLED]
-    may_settle = is_last_chain and not chain_scene.parts.loading.unknowns
-    may_settle = may_settle and not chain_scene.parts.loading_noise.is_active
+    may_settle = includes_last_segment and not first_segment_scene.parts.loading.unknowns
+    may_settle = may_settle and not first_segment_scene.parts.loading_noise.is_active
     if may_settle and any(spec.terminal for spec in settling):
         may_settle = not _is_steady_sliding_unstable(scene)
     if may_settle or not settling:
@@ -214,7 +216,9 @@ def select_event_specs(
     return [spec for spec in event_specs if spec not in settling]
 
 
-def drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator[Event]:
+def drop_settling_events_if_unstable(
+    scene: Scene, motion_events: Iterator[Event]
+) -> Iterator[Event]:
     """Yield the events of a motion, except settling at unstable steady sliding.
 
     The stability is computed only if the motion has a settling event. Most motions do not have
@@ -232,7 +236,7 @@ def drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator
     Event
         Events of the motion. Settling events are omitted if steady sliding is unstable.
     """
-    for event in motion:
+    for event in motion_events:
         if event.kind is not EventKind.SETTLED or not _is_steady_sliding_unstable(scene):
             yield event
 

@@ -22,7 +22,7 @@ from rsfstudy.motion.array_layout import (
     SLOW_REGIME,
     SPEC_KIND,
     SPEC_LEVEL,
-    SPEC_MAY_DEFER,
+    SPEC_MAY_REPORT_LATER,
     SPEC_QUANTITY,
     SPRING_STRESS,
 )
@@ -32,7 +32,10 @@ from rsfstudy.motion.regime_switching import (
     compute_margin_to_termination,
 )
 from rsfstudy.motion.root_finding import build_root_finder
-from rsfstudy.motion.step_integration import evaluate_point_at_clock, time_since_regime_start
+from rsfstudy.motion.step_integration import (
+    compute_time_since_regime_start,
+    evaluate_point_within_step,
+)
 from rsfstudy.motion.steppers import interpolate_unknowns
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY
 
@@ -42,7 +45,7 @@ from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY
 SWITCH_CONDITION, TIME_CONDITION, TERMINATION_CONDITION = -1.0, -2.0, -3.0
 
 
-def evaluate_event_quantity(event_spec, point_columns, parameters):
+def evaluate_event_function(event_spec, point_columns, parameters):
     """Return the quantity that changes sign at an event.
 
     For an extremum, the result is the derivative of the requested quantity. For a crossing, the
@@ -91,7 +94,7 @@ def get_event_specification(workspace, spec_index):
     )
 
 
-def has_deferrable_event(workspace):
+def may_any_event_be_reported_later(workspace):
     """Return True if any requested event may be reported later than it occurs.
 
     Parameters
@@ -106,7 +109,7 @@ def has_deferrable_event(workspace):
     """
     found = False
     for w in range(workspace.event_spec_count):
-        found = found or get_event_specification(workspace, w)[SPEC_MAY_DEFER] != 0.0
+        found = found or get_event_specification(workspace, w)[SPEC_MAY_REPORT_LATER] != 0.0
     return found
 
 
@@ -141,7 +144,7 @@ def compute_excess_over_switch_threshold(motion, workspace, point_columns):
     )
 
 
-def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direction):
+def has_event_occurred(event_spec, quantity_before, quantity_after, integration_direction):
     """Return True if a quantity changes sign in the direction of an event.
 
     Parameters
@@ -162,7 +165,7 @@ def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direct
     """
     upwards = event_spec[SPEC_KIND] == RISE or event_spec[SPEC_KIND] == MINIMUM
     # If the integration runs backward, derivatives change sign in the opposite direction.
-    if clock_direction < 0.0 and (
+    if integration_direction < 0.0 and (
         event_spec[SPEC_KIND] == MAXIMUM or event_spec[SPEC_KIND] == MINIMUM
     ):
         upwards = not upwards
@@ -171,7 +174,7 @@ def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direct
     return quantity_before > 0.0 >= quantity_after
 
 
-def evaluate_condition_at_clock(clock, condition_context):
+def evaluate_root_condition(independent_variable, condition_context):
     """Evaluate a condition within the step. The root finder calls this function.
 
     Parameters
@@ -189,13 +192,13 @@ def evaluate_condition_at_clock(clock, condition_context):
     """
     what, motion, workspace = condition_context
     if what == TIME_CONDITION:
-        interpolate_unknowns(motion, workspace, clock)
+        interpolate_unknowns(motion, workspace, independent_variable)
         return (
             motion.regime_start_time
-            + time_since_regime_start(motion, workspace, workspace.y_within)
+            + compute_time_since_regime_start(motion, workspace, workspace.y_within)
             - motion.target_time
         )
-    evaluate_point_at_clock(motion, workspace, clock)
+    evaluate_point_within_step(motion, workspace, independent_variable)
     if what == SWITCH_CONDITION:
         return compute_excess_over_switch_threshold(motion, workspace, workspace.point_within)
     if what == TERMINATION_CONDITION:
@@ -204,12 +207,12 @@ def evaluate_condition_at_clock(clock, condition_context):
             workspace.point_within[NORMAL_STRESS_RATIO],
             workspace.parameters[LOAD_VELOCITY],
         )
-    return evaluate_event_quantity(
+    return evaluate_event_function(
         get_event_specification(workspace, int(what)), workspace.point_within, workspace.parameters
     )
 
 
-_find_clock_where_condition_is_zero = build_root_finder(evaluate_condition_at_clock)
+_find_root_of_condition = build_root_finder(evaluate_root_condition)
 
 
 def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspace):
@@ -242,6 +245,6 @@ def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspac
         (1e-15 * width, 1e-15) if condition == TIME_CONDITION else (1e-13 * width, 1e-14)
     )
     given = condition, motion, workspace
-    return _find_clock_where_condition_is_zero(
+    return _find_root_of_condition(
         motion.clock, motion.end, value_at_begin, value_at_end, finest, relative, given
     )

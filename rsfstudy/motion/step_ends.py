@@ -26,16 +26,16 @@ from rsfstudy.motion.step_conditions import (
     locate_sign_change,
 )
 from rsfstudy.motion.step_integration import (
-    time_at_step_begin,
-    time_at_step_end,
-    time_since_regime_start,
-    truncate_step_at_clock,
+    compute_time_at_step_begin,
+    compute_time_at_step_end,
+    compute_time_since_regime_start,
+    truncate_step_at,
 )
 from rsfstudy.motion.steppers import retake_step
 from rsfstudy.parts import LOAD_VELOCITY
 
 #: Number of iterations that correct the end of the last step of a loading segment.
-CORRECTION_COUNT_OF_SEGMENT_END_CLOCK = 2
+SEGMENT_END_CORRECTION_ITERATIONS = 2
 
 
 def is_step_end_valid(motion, workspace):
@@ -72,7 +72,7 @@ def is_step_end_valid(motion, workspace):
     )
     if at_begin <= 0.0:
         return False
-    truncate_step_at_clock(
+    truncate_step_at(
         motion,
         workspace,
         locate_sign_change(TERMINATION_CONDITION, at_begin, at_end, motion, workspace),
@@ -103,19 +103,19 @@ def truncate_step_at_end_of_regime_or_segment(motion, workspace):
     )
     leaves = after >= 0.0 > before
     if leaves:
-        truncate_step_at_clock(
+        truncate_step_at(
             motion,
             workspace,
             locate_sign_change(SWITCH_CONDITION, before, after, motion, workspace),
         )
     if motion.time_per_step > 0.0 and motion.end == motion.clock + motion.step_length:
         return leaves, True
-    over = time_at_step_end(motion, workspace) >= motion.end_time
+    over = compute_time_at_step_end(motion, workspace) >= motion.end_time
     if over:
         motion.target_time = motion.end_time
-        at_begin = time_at_step_begin(motion, workspace) - motion.end_time
-        at_end = time_at_step_end(motion, workspace) - motion.end_time
-        end_step_at_end_time(
+        at_begin = compute_time_at_step_begin(motion, workspace) - motion.end_time
+        at_end = compute_time_at_step_end(motion, workspace) - motion.end_time
+        repeat_step_to_segment_end_time(
             motion,
             workspace,
             locate_sign_change(TIME_CONDITION, at_begin, at_end, motion, workspace),
@@ -123,7 +123,7 @@ def truncate_step_at_end_of_regime_or_segment(motion, workspace):
     return leaves, over
 
 
-def end_step_at_end_time(motion, workspace, clock):
+def repeat_step_to_segment_end_time(motion, workspace, independent_variable):
     """Repeat the step so that it ends at the end time of the segment.
 
     If numerical stability limits the step size, the dense output is much less accurate than the
@@ -139,10 +139,12 @@ def end_step_at_end_time(motion, workspace, clock):
     clock : float
         Estimate of the independent variable at the end time, computed from dense output.
     """
-    for _ in range(CORRECTION_COUNT_OF_SEGMENT_END_CLOCK):
-        retake_step(motion, workspace, clock)
-        late = time_at_step_end(motion, workspace) - motion.end_time
-        clock -= late / time_since_regime_start(motion, workspace, workspace.rates_at_end)
+    for _ in range(SEGMENT_END_CORRECTION_ITERATIONS):
+        retake_step(motion, workspace, independent_variable)
+        late = compute_time_at_step_end(motion, workspace) - motion.end_time
+        independent_variable -= late / compute_time_since_regime_start(
+            motion, workspace, workspace.rates_at_end
+        )
     evaluate_function_into_array(
         workspace.functions.fill_point,
         workspace.y_end,

@@ -27,7 +27,7 @@ from rsfstudy.motion.array_layout import (
     SPEC_LEVEL,
     SPEC_MAX_DISTANCE,
     SPEC_MAX_FRICTION_DISTANCE,
-    SPEC_MAY_DEFER,
+    SPEC_MAY_REPORT_LATER,
     SPEC_QUANTITY,
     SPEC_TERMINAL,
     SPRING_STRESS,
@@ -36,17 +36,17 @@ from rsfstudy.motion.array_layout import (
     STEADY_STATE_OFFSET,
 )
 from rsfstudy.motion.step_conditions import (
-    evaluate_event_quantity,
+    evaluate_event_function,
     get_event_specification,
     has_event_occurred,
     locate_sign_change,
 )
 from rsfstudy.motion.step_integration import (
-    evaluate_point_at_clock,
-    slip_since_start,
-    time_at_step_begin,
-    time_at_step_end,
-    time_since_regime_start,
+    compute_slip_since_motion_start,
+    compute_time_at_step_begin,
+    compute_time_at_step_end,
+    compute_time_since_regime_start,
+    evaluate_point_within_step,
 )
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, B
 
@@ -60,7 +60,9 @@ SETTLED_LEVEL_FACTOR_FOR_RATE_AND_STATES = 10.0
 NO_EVENT, BEFORE_JUMP, AFTER_JUMP = range(3)
 
 
-def append_event_row(motion, event_table, event_code, clock, time, point_columns, parameters):
+def append_event_row(
+    motion, event_table, event_code, independent_variable, time, point_columns, parameters
+):
     """Append an event to the event table.
 
     Parameters
@@ -84,11 +86,11 @@ def append_event_row(motion, event_table, event_code, clock, time, point_columns
     event_table[n, EVENT_CODE], event_table[n, EVENT_REGIME], event_table[n, EVENT_CLOCK] = (
         event_code,
         motion.regime,
-        clock,
+        independent_variable,
     )
     event_table[n, EVENT_TIME] = motion.time + time
-    event_table[n, EVENT_SLIP] = slip_since_start(
-        motion, clock, time, point_columns[SPRING_STRESS], parameters
+    event_table[n, EVENT_SLIP] = compute_slip_since_motion_start(
+        motion, independent_variable, time, point_columns[SPRING_STRESS], parameters
     )
     event_table[n, EVENT_EVALUATIONS] = motion.evaluations_slow + motion.evaluations_fast
     for i in range(event_table.shape[1] - EVENT_POINT):
@@ -110,7 +112,7 @@ def append_step_end_event(motion, workspace, event_table, event_code):
     event_code : int
         Code of the event, ``END_CODE`` or ``SAMPLED_CODE``.
     """
-    passed = time_at_step_end(motion, workspace)
+    passed = compute_time_at_step_end(motion, workspace)
     append_event_row(
         motion,
         event_table,
@@ -145,7 +147,7 @@ def append_start_events(motion, workspace, last_point, event_table):
     bool
         True if an appended event ends the motion.
     """
-    p, passed = workspace.parameters, time_at_step_begin(motion, workspace)
+    p, passed = workspace.parameters, compute_time_at_step_begin(motion, workspace)
     p_before = workspace.parameters_before if motion.pending_start == KINK_CODE else p
     if motion.pending_start != KINK_CODE or motion.kinks_ahead < motion.reported_kinks:
         append_event_row(
@@ -199,8 +201,8 @@ def find_jump_side_of_event(
         return NO_EVENT
     if not has_event_occurred(
         event_spec,
-        evaluate_event_quantity(event_spec, point_before, parameters_before),
-        evaluate_event_quantity(event_spec, point_after, parameters_after),
+        evaluate_event_function(event_spec, point_before, parameters_before),
+        evaluate_event_function(event_spec, point_after, parameters_after),
         1.0,
     ):
         return NO_EVENT
@@ -256,8 +258,8 @@ def locate_events_in_step(motion, workspace):
                 workspace.event_clocks[w] = motion.end
         else:
             before, after = (
-                evaluate_event_quantity(spec, workspace.point_at_begin, p),
-                evaluate_event_quantity(spec, workspace.point_at_end, p),
+                evaluate_event_function(spec, workspace.point_at_begin, p),
+                evaluate_event_function(spec, workspace.point_at_end, p),
             )
             changes = before < 0.0 <= after or before > 0.0 >= after
             if changes and has_event_occurred(spec, before, after, motion.direction):
@@ -303,20 +305,20 @@ def append_events_in_step(motion, workspace, event_table):
         clock = workspace.event_clocks[first]
         workspace.event_clocks[first] = math.nan
         if clock == motion.end:
-            passed = time_at_step_end(motion, workspace)
+            passed = compute_time_at_step_end(motion, workspace)
             append_event_row(
                 motion, event_table, float(first), clock, passed, workspace.point_at_end, p
             )
         else:
-            evaluate_point_at_clock(motion, workspace, clock)
-            passed = motion.regime_start_time + time_since_regime_start(
+            evaluate_point_within_step(motion, workspace, clock)
+            passed = motion.regime_start_time + compute_time_since_regime_start(
                 motion, workspace, workspace.y_within
             )
             append_event_row(
                 motion, event_table, float(first), clock, passed, workspace.point_within, p
             )
         spec = get_event_specification(workspace, first)
-        urgent = max(urgent, 1 if spec[SPEC_MAY_DEFER] else 2)
+        urgent = max(urgent, 1 if spec[SPEC_MAY_REPORT_LATER] else 2)
         if spec[SPEC_TERMINAL]:
             return 3
     return urgent

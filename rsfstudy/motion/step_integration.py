@@ -26,7 +26,7 @@ from rsfstudy.motion.steppers import (
     retake_step,
     step_to_segment_end,
 )
-from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
+from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_independent_variable
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS
 
 #: Constants of ``halve_step_until_dense_output_is_accurate``. ``MAX_SLOPE_ERROR`` limits the error
@@ -38,7 +38,7 @@ from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS
 MAX_SLOPE_ERROR, MAX_HALVINGS, GROWTH_FACTOR, SLOPE_SPACING = 300.0, 6, 1.3, 5e-3
 
 
-def time_since_regime_start(motion, workspace, y):
+def compute_time_since_regime_start(motion, workspace, y):
     """Return the time since the start of the regime.
 
     Parameters
@@ -61,7 +61,7 @@ def time_since_regime_start(motion, workspace, y):
     return unit * y[workspace.unknown_count - 1]
 
 
-def time_at_step_begin(motion, workspace):
+def compute_time_at_step_begin(motion, workspace):
     """Return the time from the start of the segment to the start of the step.
 
     Parameters
@@ -76,10 +76,12 @@ def time_at_step_begin(motion, workspace):
     float
         Time in D_c/V_*, or NaN if time is not an unknown.
     """
-    return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y)
+    return motion.regime_start_time + compute_time_since_regime_start(
+        motion, workspace, workspace.y
+    )
 
 
-def time_at_step_end(motion, workspace):
+def compute_time_at_step_end(motion, workspace):
     """Return the time from the start of the segment to the end of the step.
 
     Parameters
@@ -94,10 +96,12 @@ def time_at_step_end(motion, workspace):
     float
         Time in D_c/V_*, or NaN if time is not an unknown.
     """
-    return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y_end)
+    return motion.regime_start_time + compute_time_since_regime_start(
+        motion, workspace, workspace.y_end
+    )
 
 
-def slip_since_start(motion, clock, time, spring_stress, parameters):
+def compute_slip_since_motion_start(motion, independent_variable, time, spring_stress, parameters):
     r"""Compute the slip since the start of the motion.
 
     Slip is the independent variable of a rigid slider. For other sliders, slip is computed from the
@@ -123,7 +127,7 @@ def slip_since_start(motion, clock, time, spring_stress, parameters):
         Slip in D_c.
     """
     if motion.slip_is_clock:
-        return clock
+        return independent_variable
     if motion.noise_rate_index > 0:
         spring_stress -= parameters[motion.noise_rate_index] * time
     return motion.slip + (
@@ -194,8 +198,8 @@ def take_step_to_next_loading_kink(motion, workspace, max_length):
         Size of the step, ``BUDGET_SPENT``, or 0 if no step was taken. The function takes no step if
         the kink is farther away than ``max_length``, or if the stepper cannot take this step.
     """
-    left = motion.end_time - time_at_step_begin(motion, workspace)
-    length = left / time_since_regime_start(motion, workspace, workspace.rates)
+    left = motion.end_time - compute_time_at_step_begin(motion, workspace)
+    length = left / compute_time_since_regime_start(motion, workspace, workspace.rates)
     return step_to_segment_end(motion, workspace, length) if 0.0 < length <= max_length else 0.0
 
 
@@ -254,7 +258,9 @@ def is_dense_output_accurate(motion, workspace):
                 workspace.dense_slopes[i] += weight / (12.0 * SLOPE_SPACING) * workspace.y_within[i]
         interpolate_unknowns(motion, workspace, clock)
         count_evaluations(motion, 1)
-        evaluate_rates_by_step_clock(motion, workspace, workspace.y_within, workspace.rates_within)
+        evaluate_rates_by_independent_variable(
+            motion, workspace, workspace.y_within, workspace.rates_within
+        )
         for i in range(workspace.unknown_count):
             differ = abs(motion.step_length * workspace.rates_within[i] - workspace.dense_slopes[i])
             size = workspace.scales[i] + max(abs(workspace.y[i]), abs(workspace.y_end[i]))
@@ -264,7 +270,7 @@ def is_dense_output_accurate(motion, workspace):
     return True
 
 
-def evaluate_point_at_clock(motion, workspace, clock):
+def evaluate_point_within_step(motion, workspace, independent_variable):
     """Compute ``workspace.point_within`` at a value of the independent variable.
 
     Parameters
@@ -276,7 +282,7 @@ def evaluate_point_at_clock(motion, workspace, clock):
     clock : float
         Value of the independent variable between the beginning and the end of the step.
     """
-    interpolate_unknowns(motion, workspace, clock)
+    interpolate_unknowns(motion, workspace, independent_variable)
     count_evaluations(motion, 1)
     evaluate_function_into_array(
         workspace.functions.fill_rates,
@@ -294,7 +300,7 @@ def evaluate_point_at_clock(motion, workspace, clock):
     )
 
 
-def truncate_step_at_clock(motion, workspace, clock):
+def truncate_step_at(motion, workspace, independent_variable):
     """Truncate the step at a value of the independent variable within the step.
 
     Parameters
@@ -306,8 +312,8 @@ def truncate_step_at_clock(motion, workspace, clock):
     clock : float
         Value of the independent variable between the beginning and the end of the step.
     """
-    if clock != motion.end:
-        evaluate_point_at_clock(motion, workspace, clock)
+    if independent_variable != motion.end:
+        evaluate_point_within_step(motion, workspace, independent_variable)
         copy_values(workspace.point_within, workspace.point_at_end, FIRST_STATE + motion.states)
         copy_values(workspace.y_within, workspace.y_end, workspace.unknown_count)
-        motion.end = clock
+        motion.end = independent_variable

@@ -21,16 +21,16 @@ from rsfstudy.motion.array_layout import (
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
     REGIME_COLUMN,
-    SAMPLE_COLUMN,
+    SAMPLE_NUMBER_COLUMN,
     SAMPLES_PER_STEP,
 )
 from rsfstudy.motion.step_conditions import TIME_CONDITION, locate_sign_change
 from rsfstudy.motion.step_integration import (
-    evaluate_point_at_clock,
-    slip_since_start,
-    time_at_step_begin,
-    time_at_step_end,
-    time_since_regime_start,
+    compute_slip_since_motion_start,
+    compute_time_at_step_begin,
+    compute_time_at_step_end,
+    compute_time_since_regime_start,
+    evaluate_point_within_step,
 )
 
 
@@ -47,7 +47,7 @@ def record_regime_start(motion, workspace, recording_table):
         Output table of recorded samples.
     """
     if motion.recording_mode == RECORD_WITHIN_STEPS:
-        append_recorded_row(
+        append_sample_row(
             motion,
             recording_table,
             motion.clock,
@@ -55,10 +55,10 @@ def record_regime_start(motion, workspace, recording_table):
             workspace.point_at_begin,
             workspace.parameters,
         )
-        recording_table[motion.recorded_rows - 1, SAMPLE_COLUMN] = 0.0
+        recording_table[motion.recorded_rows - 1, SAMPLE_NUMBER_COLUMN] = 0.0
 
 
-def is_step_recorded(motion, workspace, requested_samples):
+def should_record_step(motion, workspace, requested_samples):
     """Return True if samples are recorded within the step.
 
     Parameters
@@ -78,14 +78,14 @@ def is_step_recorded(motion, workspace, requested_samples):
     """
     if motion.recording_mode != RECORD_AT_TIMES:
         return motion.recording_mode != RECORD_NEVER
-    end = time_at_step_end(motion, workspace) + motion.time
+    end = compute_time_at_step_end(motion, workspace) + motion.time
     return (
         motion.samples_taken < len(requested_samples)
         and requested_samples[motion.samples_taken] < end
     )
 
 
-def record_step(motion, workspace, recording_table, requested_samples, is_motion_over):
+def record_step_samples(motion, workspace, recording_table, requested_samples, is_motion_over):
     """Record samples of the step, and return True after the last requested sample.
 
     Parameters
@@ -109,14 +109,14 @@ def record_step(motion, workspace, recording_table, requested_samples, is_motion
         True if the last requested sample was recorded in this step.
     """
     if motion.recording_mode == RECORD_WITHIN_STEPS:
-        record_step_evenly_spaced(motion, workspace, recording_table)
+        record_evenly_spaced_samples(motion, workspace, recording_table)
         return False
     before = motion.samples_taken
     record_requested_samples(motion, workspace, recording_table, requested_samples, is_motion_over)
     return before < motion.samples_taken == len(requested_samples)
 
 
-def record_step_evenly_spaced(motion, workspace, recording_table):
+def record_evenly_spaced_samples(motion, workspace, recording_table):
     """Record ``SAMPLES_PER_STEP`` samples of the step.
 
     The last sample is the end of the step.
@@ -132,13 +132,13 @@ def record_step_evenly_spaced(motion, workspace, recording_table):
     """
     for sample in range(1, SAMPLES_PER_STEP):
         clock = motion.clock + (motion.end - motion.clock) * (sample / SAMPLES_PER_STEP)
-        record_at_clock(motion, workspace, recording_table, clock)
-        recording_table[motion.recorded_rows - 1, SAMPLE_COLUMN] = sample
-    passed = time_at_step_end(motion, workspace)
-    append_recorded_row(
+        record_sample_within_step(motion, workspace, recording_table, clock)
+        recording_table[motion.recorded_rows - 1, SAMPLE_NUMBER_COLUMN] = sample
+    passed = compute_time_at_step_end(motion, workspace)
+    append_sample_row(
         motion, recording_table, motion.end, passed, workspace.point_at_end, workspace.parameters
     )
-    recording_table[motion.recorded_rows - 1, SAMPLE_COLUMN] = SAMPLES_PER_STEP
+    recording_table[motion.recorded_rows - 1, SAMPLE_NUMBER_COLUMN] = SAMPLES_PER_STEP
 
 
 def record_requested_samples(motion, workspace, recording_table, requested_samples, is_motion_over):
@@ -160,8 +160,8 @@ def record_requested_samples(motion, workspace, recording_table, requested_sampl
     """
     at_begin, at_end = motion.clock, motion.end
     if motion.recording_mode == RECORD_AT_TIMES:
-        at_begin = time_at_step_begin(motion, workspace)
-        at_end = time_at_step_end(motion, workspace)
+        at_begin = compute_time_at_step_begin(motion, workspace)
+        at_end = compute_time_at_step_end(motion, workspace)
     last = motion.end_time if is_motion_over else at_end
     while (
         motion.samples_taken < len(requested_samples)
@@ -170,8 +170,8 @@ def record_requested_samples(motion, workspace, recording_table, requested_sampl
         asked = requested_samples[motion.samples_taken] - motion.time
         motion.samples_taken += 1
         if asked <= at_begin:
-            passed = time_at_step_begin(motion, workspace)
-            append_recorded_row(
+            passed = compute_time_at_step_begin(motion, workspace)
+            append_sample_row(
                 motion,
                 recording_table,
                 motion.clock,
@@ -180,8 +180,8 @@ def record_requested_samples(motion, workspace, recording_table, requested_sampl
                 workspace.parameters,
             )
         elif asked >= at_end:
-            passed = time_at_step_end(motion, workspace)
-            append_recorded_row(
+            passed = compute_time_at_step_end(motion, workspace)
+            append_sample_row(
                 motion,
                 recording_table,
                 motion.end,
@@ -196,10 +196,10 @@ def record_requested_samples(motion, workspace, recording_table, requested_sampl
                 clock = locate_sign_change(
                     TIME_CONDITION, at_begin - asked, at_end - asked, motion, workspace
                 )
-            record_at_clock(motion, workspace, recording_table, clock)
+            record_sample_within_step(motion, workspace, recording_table, clock)
 
 
-def record_at_clock(motion, workspace, recording_table, clock):
+def record_sample_within_step(motion, workspace, recording_table, independent_variable):
     """Record a sample at a value of the independent variable within the step.
 
     Parameters
@@ -213,16 +213,23 @@ def record_at_clock(motion, workspace, recording_table, clock):
     clock : float
         Value of the independent variable between the beginning and the end of the step.
     """
-    evaluate_point_at_clock(motion, workspace, clock)
-    passed = motion.regime_start_time + time_since_regime_start(
+    evaluate_point_within_step(motion, workspace, independent_variable)
+    passed = motion.regime_start_time + compute_time_since_regime_start(
         motion, workspace, workspace.y_within
     )
-    append_recorded_row(
-        motion, recording_table, clock, passed, workspace.point_within, workspace.parameters
+    append_sample_row(
+        motion,
+        recording_table,
+        independent_variable,
+        passed,
+        workspace.point_within,
+        workspace.parameters,
     )
 
 
-def append_recorded_row(motion, recording_table, clock, time, point_columns, parameters):
+def append_sample_row(
+    motion, recording_table, independent_variable, time, point_columns, parameters
+):
     """Append a point of the motion to the recording table.
 
     The columns of the new row are in the order of ``recording.pack_recorded_row``.
@@ -244,8 +251,8 @@ def append_recorded_row(motion, recording_table, clock, time, point_columns, par
     """
     n = motion.recorded_rows
     recording_table[n, 0] = motion.time + (motion.end_time if time > motion.end_time else time)
-    recording_table[n, 1] = slip_since_start(
-        motion, clock, time, point_columns[SPRING_STRESS], parameters
+    recording_table[n, 1] = compute_slip_since_motion_start(
+        motion, independent_variable, time, point_columns[SPRING_STRESS], parameters
     )
     recording_table[n, 2], recording_table[n, 3], recording_table[n, 4] = (
         point_columns[LOG_SLIP_RATE],
@@ -257,7 +264,7 @@ def append_recorded_row(motion, recording_table, clock, time, point_columns, par
         point_columns[STATE_VARIABLE],
         point_columns[APPARENT_FRICTION],
     )
-    recording_table[n, REGIME_COLUMN], recording_table[n, SAMPLE_COLUMN] = motion.regime, 0.0
+    recording_table[n, REGIME_COLUMN], recording_table[n, SAMPLE_NUMBER_COLUMN] = motion.regime, 0.0
     for i in range(motion.states):
         recording_table[n, FIRST_STATE_COLUMN + i] = point_columns[FIRST_STATE + i]
     motion.recorded_rows = n + 1

@@ -12,7 +12,7 @@ from rsfstudy.status import Status
 
 #: Reference local tolerance for the maximum step size, which is proportional to the eighth root of
 #: the local tolerance.
-TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS = 1e-7
+REFERENCE_TOLERANCE_OF_MAX_STEP_LENGTH = 1e-7
 #: Minimum local tolerance. Below this tolerance, rounding errors dominate, and SciPy issues a
 #: warning.
 MIN_LOCAL_TOLERANCE = 5e-14
@@ -56,8 +56,8 @@ class WorkMeter:
     budget: int
     evaluations_by_regime: dict[str, int] = field(default_factory=dict)
     evaluations: int = 0
-    steps: int = 0
-    jacobians: int = 0
+    step_count: int = 0
+    jacobian_evaluations: int = 0
 
     def charge(self, regime_name: str, evaluations: int) -> None:
         """Add right-hand side evaluations, and check the budget.
@@ -93,7 +93,7 @@ class WorkMeter:
         self.evaluations += evaluations
 
     @property
-    def budget_advice(self) -> str:
+    def larger_budget_advice(self) -> str:
         """Final sentence of an error message, which suggests a fourfold budget."""
         return (
             f". To continue, increase the budget to {4 * self.budget}: --budget "
@@ -115,7 +115,7 @@ class WorkMeter:
                 "result was found",
             )
 
-    def charge_new_work(
+    def charge_work_since_last_call(
         self, regime_names: Sequence[str], work_before: Sequence[int], work_now: Sequence[int]
     ) -> int:
         """Add the evaluations and steps of a motion since the previous call.
@@ -140,8 +140,8 @@ class WorkMeter:
             self.add_evaluations(regime_names[0], work_now[0] - work_before[0])
         if work_now[1] > work_before[1]:
             self.add_evaluations(regime_names[1], work_now[1] - work_before[1])
-        self.steps += work_now[2] - work_before[2]
-        self.jacobians += work_now[3] - work_before[3]
+        self.step_count += work_now[2] - work_before[2]
+        self.jacobian_evaluations += work_now[3] - work_before[3]
         return others
 
 

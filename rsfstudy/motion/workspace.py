@@ -39,7 +39,7 @@ from rsfstudy.motion.array_operations import (
     evaluate_function_into_array,
 )
 from rsfstudy.motion.in_place_functions import InPlaceFunctions
-from rsfstudy.motion.regime_switching import SwitchThresholds
+from rsfstudy.motion.regime_switching import RegimeSwitchThresholds
 from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,
     HEADER_SIZE,
@@ -47,7 +47,7 @@ from rsfstudy.motion.steppers.unrolled_step import (
     STAGE_COUNT_WITH_DENSE_OUTPUT,
 )
 
-Array = Any
+ArrayOrPointer = Any
 #: Positive number that replaces a zero derivative of time, to avoid a division by zero.
 REPLACEMENT_OF_ZERO_TIME_DERIVATIVE = 1e-300
 
@@ -104,31 +104,31 @@ class Workspace(NamedTuple):
     """
 
     unknown_count: int
-    y: Array
-    y_end: Array
-    rates: Array
-    rates_at_end: Array
-    stage_rates: Array
-    order_eight_step_block: Array
-    scales: Array
-    dense_output_rows: Array
-    y_within: Array
-    rates_within: Array
-    dense_slopes: Array
-    point_at_begin: Array
-    point_at_end: Array
-    point_within: Array
-    event_clocks: Array
+    y: ArrayOrPointer
+    y_end: ArrayOrPointer
+    rates: ArrayOrPointer
+    rates_at_end: ArrayOrPointer
+    stage_rates: ArrayOrPointer
+    order_eight_step_block: ArrayOrPointer
+    scales: ArrayOrPointer
+    dense_output_rows: ArrayOrPointer
+    y_within: ArrayOrPointer
+    rates_within: ArrayOrPointer
+    dense_slopes: ArrayOrPointer
+    point_at_begin: ArrayOrPointer
+    point_at_end: ArrayOrPointer
+    point_within: ArrayOrPointer
+    event_clocks: ArrayOrPointer
     functions: InPlaceFunctions
-    event_specs: Array
+    event_specs: ArrayOrPointer
     event_spec_count: int
-    parameters: Array
-    parameters_before: Array
-    switch_thresholds: SwitchThresholds
+    parameters: ArrayOrPointer
+    parameters_before: ArrayOrPointer
+    switch_thresholds: RegimeSwitchThresholds
     stepper: Any
 
 
-def workspace_size(unknown_count: int, state_count: int, event_spec_count: int) -> int:
+def compute_workspace_size(unknown_count: int, state_count: int, event_spec_count: int) -> int:
     """Compute the length of the array that holds a workspace.
 
     Parameters
@@ -219,7 +219,7 @@ def create_workspace(
     )
 
 
-def evaluate_rates_by_step_clock(motion, workspace, y, result):
+def evaluate_rates_by_independent_variable(motion, workspace, y, result):
     """Evaluate the derivatives with respect to the step's independent variable.
 
     Parameters

@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.plots._image_files import NotebookFigure
-from rsfstudy.plots._size import figure_size
+from rsfstudy.plots._size import compute_figure_size_in_inches
 from rsfstudy.plots._style import (
     add_legend,
     cycle_marker,
     cycle_style,
-    enlarge_for_legends,
     finalize_layout,
+    increase_figure_height_for_legends,
 )
 
 CurvePoints = Sequence[tuple[float, float]]
@@ -47,7 +47,7 @@ def draw_agreement(digits: Mapping[str, CurvePoints], label: str, required_digit
     >>> figure.axes[0].get_xlabel()
     'Time (s)'
     """
-    figure = NotebookFigure(figsize=figure_size(2, 1), layout="constrained")
+    figure = NotebookFigure(figsize=compute_figure_size_in_inches(2, 1), layout="constrained")
     axes = figure.subplots()
     for number, (name, points) in enumerate(digits.items()):
         style = {"color": cycle_style(number)["color"], "fillstyle": "none"}
@@ -59,6 +59,6 @@ def draw_agreement(digits: Mapping[str, CurvePoints], label: str, required_digit
     )
     axes.set(xlabel=label[0].upper() + label[1:], ylabel="Number of correct digits")
     add_legend(axes, 5)
-    enlarge_for_legends(figure, [[axes]])
+    increase_figure_height_for_legends(figure, [[axes]])
     finalize_layout(figure)
     return figure

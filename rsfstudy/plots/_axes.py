@@ -22,13 +22,13 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.plots._style import estimate_text_capacity_in_characters
 from rsfstudy.plots._text import (
+    convert_symbols_to_mathtext,
+    estimate_visible_length,
+    find_quantity_symbol_or_name,
     format_number,
     format_quantity_axis_label,
     format_stiffness_ratio,
     format_units,
-    quantity_symbol,
-    to_mathtext,
-    visible_length,
     wrap_text,
 )
 from rsfstudy.storage import StoredDataset
@@ -40,13 +40,13 @@ from rsfstudy.vocabulary import find_coverage_content_type, find_quantity
 _MIN_RATIO_FOR_LOG_SCALE = 100.0
 #: If the ratio of the upper to the lower limit of a log axis is less than this value, the axis has
 #: additional tick labels between powers of ten.
-_MAX_RATIO_FOR_MINOR_LABELS = 50.0
+_MAX_LIMIT_RATIO_FOR_MINOR_TICK_LABELS = 50.0
 #: Maximum number of tick labels along the y axis and along the x axis, if the tick labels are
 #: names.
 _MAX_POINT_NAMES_ALONG_Y, _MAX_POINT_NAMES_ALONG_X = 45, 30
 #: Maximum number of horizontal tick labels with names along x. If there are more names, the tick
 #: labels are vertical.
-_MAX_HORIZONTAL_NAMES_ALONG_X = 12
+_MAX_HORIZONTAL_TICK_NAMES_ALONG_X = 12
 #: Height of the title and the labels below a panel, in characters.
 _HEIGHT_BELOW_PANEL_IN_CHARACTERS = 6
 #: Smallest font size of figures in points.
@@ -58,7 +58,7 @@ _POINT_PHRASE_TEMPLATE_BY_AXIS = {
     "load": "load point {}",
 }
 #: Phrases that describe state evolution laws, if the name of the law is not part of the phrase.
-_PHRASE_BY_LAW = {
+_DESCRIPTION_BY_LAW_NAME = {
     "cut_off": "slowness law with cut-off",
     "flash_heating": "slip law with flash heating",
     "perrin_rice_zheng": "Perrin-Rice-Zheng law",
@@ -122,7 +122,7 @@ def read_flag_meanings_of_variable(variable: xr.DataArray) -> dict[float, str]:
     }
 
 
-def measured_variables(dataset: xr.Dataset) -> list[str]:
+def list_measured_variables(dataset: xr.Dataset) -> list[str]:
     """Return the names of the measured variables of a study.
 
     Parameters
@@ -152,11 +152,11 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
         and bool(np.isfinite(found).any())
     ]
     declared = "declaration" in dataset.attrs
-    primary = StoredDataset(dataset).primary_output if declared else None
+    primary = StoredDataset(dataset).primary_output_name if declared else None
     return sorted(measured, key=lambda name: name != primary)
 
 
-def varying_variables(dataset: xr.Dataset) -> list[str]:
+def list_primary_and_varying_variables(dataset: xr.Dataset) -> list[str]:
     """Return the names of the primary output and of the variables that vary.
 
     Parameters
@@ -170,7 +170,7 @@ def varying_variables(dataset: xr.Dataset) -> list[str]:
         Name of the primary output, followed by the names of all other measured variables that have
         at least two different values.
     """
-    names = measured_variables(dataset)
+    names = list_measured_variables(dataset)
     return names[:1] + [n for n in names[1:] if float(dataset[n].max()) > float(dataset[n].min())]
 
 
@@ -327,18 +327,20 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
     value = cell[dimension].item()
     about = find_quantity(dimension, read_quantities_not_in_vocabulary(cell.coords.to_dataset()))
     if isinstance(value, str):
-        if dimension == "law" and value in _PHRASE_BY_LAW:
-            return _PHRASE_BY_LAW[value]
-        return _POINT_PHRASE_TEMPLATE_BY_AXIS.get(dimension, "{}").format(to_mathtext(value))
+        if dimension == "law" and value in _DESCRIPTION_BY_LAW_NAME:
+            return _DESCRIPTION_BY_LAW_NAME[value]
+        return _POINT_PHRASE_TEMPLATE_BY_AXIS.get(dimension, "{}").format(
+            convert_symbols_to_mathtext(value)
+        )
     if dimension == "stiffness_ratio":
         return format_stiffness_ratio(value)
     if dimension == "inertia":
         return "with inertia" if value else "without inertia"
     units = {"": "", "1": "", "degree": "°"}.get(about.units, f" {format_units(about.units)}")
-    return f"{quantity_symbol(about)} = {format_number(value, 4)}{units}"
+    return f"{find_quantity_symbol_or_name(about)} = {format_number(value, 4)}{units}"
 
 
-def set_x_axis_of_dimension(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
+def set_up_x_axis_for_dimension(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
     """Set up the x axis for the points of a dimension.
 
     If the coordinate contains names instead of numbers, the names become tick labels.
@@ -363,11 +365,11 @@ def set_x_axis_of_dimension(axes: Axes, dataset: xr.Dataset, dimension: str) -> 
         return np.asarray(points, dtype=float)
     names, width = [str(point) for point in points], max(8, 48 // points.size)
     longest = max(
-        visible_length(part)
+        estimate_visible_length(part)
         for name in names
-        for part in wrap_text(to_mathtext(name), width).split("\n")
+        for part in wrap_text(convert_symbols_to_mathtext(name), width).split("\n")
     )
-    upright = points.size > _MAX_HORIZONTAL_NAMES_ALONG_X or longest > 1.4 * width
+    upright = points.size > _MAX_HORIZONTAL_TICK_NAMES_ALONG_X or longest > 1.4 * width
     set_ticks_with_point_names(
         axes.xaxis, names, 40 if upright else width, _MAX_POINT_NAMES_ALONG_X
     )
@@ -395,7 +397,7 @@ def set_log_scale(axes: Axes, axis_name: str) -> None:
     if high < 3.0 * low:
         axis.set_major_locator(MaxNLocator(3))
         axis.set_major_formatter(FuncFormatter(lambda value, _place: format_number(value)))
-    elif high < _MAX_RATIO_FOR_MINOR_LABELS * low:
+    elif high < _MAX_LIMIT_RATIO_FOR_MINOR_TICK_LABELS * low:
         between: tuple[float, ...] = (3.0,)
         if high < 10.0 * low:
             between = (2.0, 5.0) if axis_name == "x" else (2.0, 3.0, 4.0, 6.0, 8.0)
@@ -425,7 +427,10 @@ def set_ticks_with_point_names(
         intervals.
     """
     some = slice(None, None, -(-len(point_names) // max_ticks))
-    texts = [wrap_text(to_mathtext(name), max_line_characters) for name in point_names[some]]
+    texts = [
+        wrap_text(convert_symbols_to_mathtext(name), max_line_characters)
+        for name in point_names[some]
+    ]
     axis.set_ticks(range(len(point_names))[some], texts)
 
 
@@ -461,7 +466,7 @@ def label_rows(axes: Axes, names: list[str], width: int = 60) -> None:
 # ---- colour scales ------------------------------------------------------------------------------
 
 
-def point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
+def compute_point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
     """Return the colours of the points of a numeric dimension.
 
     Parameters
@@ -481,7 +486,7 @@ def point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
     return np.asarray(_build_colour_scale(dataset, dimension).to_rgba(points))
 
 
-def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
+def add_colour_bar_of_dimension(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     """Add a colour bar for the points of a numeric dimension.
 
     The colour bar has the same colour scale as ``point_colours``.
@@ -495,11 +500,11 @@ def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     dimension : str
         Name of the dimension.
     """
-    add_labelled_colour_bar(_build_colour_scale(dataset, dimension), dataset, axes, dimension)
+    add_colour_bar_of_variable(_build_colour_scale(dataset, dimension), dataset, axes, dimension)
 
 
-def add_labelled_colour_bar(
-    scale: ScalarMappable, dataset: xr.Dataset, axes: Axes, variable_name: str
+def add_colour_bar_of_variable(
+    colour_scale: ScalarMappable, dataset: xr.Dataset, axes: Axes, variable_name: str
 ) -> None:
     """Add a colour bar with the label of a variable.
 
@@ -514,7 +519,7 @@ def add_labelled_colour_bar(
     variable_name : str
         Name of the variable.
     """
-    bar = cast(Figure, axes.figure).colorbar(scale, ax=axes, pad=0.02)
+    bar = cast(Figure, axes.figure).colorbar(colour_scale, ax=axes, pad=0.02)
     longest = estimate_text_capacity_in_characters(axes)[1] - _HEIGHT_BELOW_PANEL_IN_CHARACTERS
     bar.set_label(format_axis_label(dataset, variable_name, min(34, longest)))
 

@@ -17,15 +17,15 @@ from rsfstudy.plots._axes import describe_point
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Figure as Declared
-from rsfstudy.study import Panel, Study, load_study, study_names
+from rsfstudy.study import Panel, Study, list_study_names, load_study
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
 
 #: Names of the generic figures that can display any study.
-_NAMES_OF_FIGURES_FOR_ANY_LATTICE = ("lines", "maps")
+_GENERIC_FIGURE_NAMES = ("lines", "maps")
 #: Name of the figure that shows fits of records.
 _NAME_OF_FITS_FIGURE = "fits"
 #: Names of all figures, including the figures of the named studies.
-FIGURE_NAMES = (*_NAMES_OF_FIGURES_FOR_ANY_LATTICE, _NAME_OF_FITS_FIGURE, *study_names())
+FIGURE_NAMES = (*_GENERIC_FIGURE_NAMES, _NAME_OF_FITS_FIGURE, *list_study_names())
 #: The panels of a figure are repeated for each point of additional axes. The first value is the
 #: maximum number of such points, and the second value is the maximum number of panels after the
 #: repetition.
@@ -55,7 +55,7 @@ def choose_figure(
         Dataset with the axes that the figure expects.
     """
     name, sizes = StoredDataset(dataset).declaration.plot, dataset["status"].sizes
-    study = load_study(name) if name in study_names() else None
+    study = load_study(name) if name in list_study_names() else None
     if name == _NAME_OF_FITS_FIGURE and variable == "posterior" and variable in dataset:
         from rsfstudy.plots import samples
 
@@ -67,12 +67,12 @@ def choose_figure(
     if (
         user_figure is None
         and study is None
-        and name not in (*_NAMES_OF_FIGURES_FOR_ANY_LATTICE, _NAME_OF_FITS_FIGURE)
+        and name not in (*_GENERIC_FIGURE_NAMES, _NAME_OF_FITS_FIGURE)
     ):
         raise InvalidValue("plot", name, "is unknown", choices=FIGURE_NAMES)
     known = {str(dimension) for dimension in sizes}
     if study is not None and user_figure in (None, study.plot):
-        user_figure, dataset = study.plot, _restore_dimensions_of_selected_axes(dataset, study)
+        user_figure, dataset = study.plot, _restore_single_point_dimensions(dataset, study)
         if isinstance(user_figure, Declared) and not user_figure.allow_extra_dims:
             known = set(study.dimensions)
     elif isinstance(user_figure, Declared):
@@ -81,20 +81,20 @@ def choose_figure(
     further = sorted(varied - known)
     many = math.prod(sizes[dimension] for dimension in further) > _MAX_POINTS_OF_REPEATED_AXES
     plain = variable is not None or user_figure is None or isinstance(user_figure, str)
-    if plain or many or DatasetUnits(dataset).are_unexpected_by_figures:
-        return _generic_figure(dataset, variable), dataset
+    if plain or many or DatasetUnits(dataset).differ_from_units_of_figures:
+        return _build_generic_figure(dataset, variable), dataset
     drawing = (
         user_figure
         if isinstance(user_figure, Declared)
         else Declared([getattr(user_figure, "draw", user_figure)])
     )
     dataset = dataset.squeeze(sorted(set(map(str, sizes)) - known - varied), drop=False)
-    panels = _expand_panels_of_figure(drawing, dataset, further)
+    panels = _repeat_panels_for_facets_and_extra_axes(drawing, dataset, further)
     few = panels and (len(panels) <= _MAX_PANELS_AFTER_REPEATING or not further)
-    return (replace(drawing, panels=panels) if few else _generic_figure(dataset)), dataset
+    return (replace(drawing, panels=panels) if few else _build_generic_figure(dataset)), dataset
 
 
-def _expand_panels_of_figure(
+def _repeat_panels_for_facets_and_extra_axes(
     figure_declaration: Declared, dataset: xr.Dataset, extra_dimensions: Sequence[str]
 ) -> list[Panel]:
     """Create the panels of a figure for all facets and additional axes.
@@ -108,7 +108,9 @@ def _expand_panels_of_figure(
         part = dataset.isel(where)
         said = ", ".join(describe_point(part, dimension) for dimension in extra_dimensions)
         each = [
-            one for panel in figure_declaration.panels for one in _panel.expand_facets(panel, part)
+            one
+            for panel in figure_declaration.panels
+            for one in _panel.split_panel_by_facets(panel, part)
         ]
         found += (
             [_panel.restrict_panel_to_point_of_extra_dims(panel, where, said) for panel in each]
@@ -122,7 +124,7 @@ def _expand_panels_of_figure(
     return found
 
 
-def _restore_dimensions_of_selected_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+def _restore_single_point_dimensions(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """Restore the dimensions of axes that were reduced to a single point."""
     gone = [d for d in study.dimensions if d not in dataset.dims and d in dataset.coords]
     if not gone:
@@ -138,7 +140,7 @@ def _restore_dimensions_of_selected_axes(dataset: xr.Dataset, study: Study) -> x
     return dataset.drop_vars([*cells, *derived, *gone]).merge(measured).assign_coords(derived)
 
 
-def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declared:
+def _build_generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declared:
     """Return a generic figure that can display any study.
 
     The figure is a corner plot for studies with samples, a set of maps if there are two numeric
@@ -148,7 +150,7 @@ def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declare
 
     logarithms = [n for n in map(str, dataset.data_vars) if "log10_" in n]
     dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
-    if corner := samples.corner_figure(dataset, variable):
+    if corner := samples.build_corner_figure(dataset, variable):
         return corner
     for module in (maps, lines):
         if found := module.panels(dataset, variable):

@@ -16,26 +16,34 @@ from matplotlib.axes import Axes
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue, RsfStudyError
-from rsfstudy.formatting import format_overrides, pluralize
+from rsfstudy.formatting import format_count_with_noun, format_overrides
 from rsfstudy.plots import _panel
 from rsfstudy.plots._figure_choice import choose_figure
 from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
-from rsfstudy.plots._size import figure_size, fit_panel_columns, header_line_length
+from rsfstudy.plots._size import (
+    compute_figure_size_in_inches,
+    compute_max_header_line_length,
+    limit_panel_columns_to_width,
+)
 from rsfstudy.plots._style import (
     add_panel_letters,
-    enlarge_for_legends,
     finalize_layout,
     freeze_tick_label_size,
+    increase_figure_height_for_legends,
     merge_common_legends,
     style_context,
 )
-from rsfstudy.plots._text import quantity_symbol, to_mathtext, wrap_text
+from rsfstudy.plots._text import (
+    convert_symbols_to_mathtext,
+    find_quantity_symbol_or_name,
+    wrap_text,
+)
 from rsfstudy.plots.samples import CornerFigure
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Figure as Declared
-from rsfstudy.study import failed_cell_mask, read_quantities_not_in_vocabulary
+from rsfstudy.study import is_failed_or_pending, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
 #: Colours of the header. The header is red if cells are missing, or if the fraction of failed cells
@@ -131,13 +139,13 @@ def draw_figure(
         raise InvalidValue(
             "own", user_figure, rule, remedy="Define, for example, def name(dataset, axes): ..."
         )
-    dataset = DatasetUnits(dataset).convert_for_display()
+    dataset = DatasetUnits(dataset).convert_to_display_units()
     with style_context(style, width):
         drawing, dataset = choose_figure(dataset, user_figure, variable)
         is_corner = isinstance(drawing, CornerFigure)
         columns = min(drawing.columns, len(drawing.panels))
-        columns = columns if is_corner else fit_panel_columns(columns)
-        figure, drawn = _create_panels(drawing, dataset, columns)
+        columns = columns if is_corner else limit_panel_columns_to_width(columns)
+        figure, drawn = _create_empty_panels(drawing, dataset, columns)
         for axes, panel in zip(drawn, drawing.panels, strict=True):
             freeze_tick_label_size(axes)
             _panel.draw_panel(panel, dataset, axes)
@@ -146,32 +154,43 @@ def draw_figure(
             if scale not in drawn:
                 freeze_tick_label_size(scale)
         if isinstance(drawing, CornerFigure):
-            drawing.finish(drawn)
+            drawing.align_x_axes_and_hide_inner_labels(drawn)
         else:
             add_panel_letters(drawn)
         merge_common_legends(figure, drawn)
         if header:
             _add_header(figure, dataset)
-        rows = [[a for a in drawn if _row_of_panel(a) == n] for n in range(len(drawn))]
-        enlarge_for_legends(figure, list(filter(None, rows)))
+        rows = [[a for a in drawn if _find_row_index_of_panel(a) == n] for n in range(len(drawn))]
+        increase_figure_height_for_legends(figure, list(filter(None, rows)))
         finalize_layout(figure)
     return figure
 
 
-def _create_panels(
-    drawing: Declared, dataset: xr.Dataset, columns: int
+def _create_empty_panels(
+    figure_declaration: Declared, dataset: xr.Dataset, column_count: int
 ) -> tuple[NotebookFigure, list[Axes]]:
     """Create a figure with empty panels."""
-    rows, places = -(-len(drawing.panels) // columns), list(range(len(drawing.panels)))
-    height = drawing.height(dataset) if callable(drawing.height) else drawing.height
-    size = figure_size(columns, rows, height)
-    if isinstance(drawing, CornerFigure):
-        rows, places, size = columns, drawing.places, drawing.size()
+    rows, places = (
+        -(-len(figure_declaration.panels) // column_count),
+        list(range(len(figure_declaration.panels))),
+    )
+    height = (
+        figure_declaration.height(dataset)
+        if callable(figure_declaration.height)
+        else figure_declaration.height
+    )
+    size = compute_figure_size_in_inches(column_count, rows, height)
+    if isinstance(figure_declaration, CornerFigure):
+        rows, places, size = (
+            column_count,
+            figure_declaration.subplot_positions,
+            figure_declaration.compute_size_in_inches(),
+        )
     figure = NotebookFigure(figsize=size, layout="constrained")
-    return figure, [figure.add_subplot(rows, columns, place + 1) for place in places]
+    return figure, [figure.add_subplot(rows, column_count, place + 1) for place in places]
 
 
-def _row_of_panel(axes: Axes) -> int:
+def _find_row_index_of_panel(axes: Axes) -> int:
     """Return the index of the row that contains a panel."""
     place = axes.get_subplotspec()
     return 0 if place is None else place.rowspan.start
@@ -180,23 +199,27 @@ def _row_of_panel(axes: Axes) -> int:
 def _add_header(figure: Figure, dataset: xr.Dataset) -> None:
     """Add a header that lists overridden settings, and missing and failed cells."""
     overrides = StoredDataset(dataset).declaration.overrides
-    missing, is_warning = _missing_cells_note(dataset)
-    lines = [_format_note_on_overrides(dataset, header_line_length(figure))] if overrides else []
+    missing, is_warning = _format_note_on_missing_cells(dataset)
+    lines = (
+        [_format_note_on_overrides(dataset, compute_max_header_line_length(figure))]
+        if overrides
+        else []
+    )
     if lines or missing:
         color = _WARNING_COLOUR if is_warning else _HEADER_COLOUR
         figure.suptitle("\n".join(filter(None, (*lines, missing))), color=color)
 
 
-def _missing_cells_note(dataset: xr.Dataset) -> tuple[str, bool]:
+def _format_note_on_missing_cells(dataset: xr.Dataset) -> tuple[str, bool]:
     """Return a note about missing and failed cells, and True if it is a warning.
 
     The note is in brackets. If the results are complete, the note is empty.
     """
     completeness = dataset.attrs.get("completeness", "complete")
-    failed = failed_cell_mask(dataset["status"]) & (dataset["status"] != Status.PENDING)
+    failed = is_failed_or_pending(dataset["status"]) & (dataset["status"] != Status.PENDING)
     count = int(failed.sum())
     parts = [completeness] * (completeness != "complete")
-    parts += [f"{pluralize(count, 'cell')} failed"] * (count > 0)
+    parts += [f"{format_count_with_noun(count, 'cell')} failed"] * (count > 0)
     many = count > _MAX_FAILED_FRACTION_WITHOUT_WARNING * failed.size
     return f"[{', '.join(parts)}]" * bool(parts), many or completeness != "complete"
 
@@ -205,13 +228,13 @@ def _format_note_on_overrides(dataset: xr.Dataset, max_line_characters: int) -> 
     """Return a note about settings that differ from the study declaration."""
     own = read_quantities_not_in_vocabulary(dataset)
     names = {
-        n: quantity_symbol(find_quantity(n, own))
+        n: find_quantity_symbol_or_name(find_quantity(n, own))
         for n in StoredDataset(dataset).declaration.overrides
     }
     values = {
         names[name]: value for name, value in StoredDataset(dataset).declaration.overrides.items()
     }
-    text = to_mathtext(
+    text = convert_symbols_to_mathtext(
         format_overrides(values).replace("=", " = ").replace(",", ", ").replace(",  ", ", ")
     )
     return wrap_text(f"overrides: {text}", max_line_characters)

@@ -16,20 +16,20 @@ from rsfstudy.errors import DataError
 from rsfstudy.fitting import Record
 from rsfstudy.plots._axes import set_log_scale
 from rsfstudy.plots._image_files import NotebookFigure
-from rsfstudy.plots._size import figure_size, fit_panel_columns
+from rsfstudy.plots._size import compute_figure_size_in_inches, limit_panel_columns_to_width
 from rsfstudy.plots._style import (
     add_legend,
     add_panel_letters,
     cycle_style,
-    enlarge_for_legends,
     finalize_layout,
+    increase_figure_height_for_legends,
     style_context,
 )
 
 #: Height of a panel in mm, and largest number of record rows to draw.
 _PANEL_HEIGHT_MM, _MAX_DRAWN_ROWS = 60.0, 20_000
 #: Number of standard errors in half the length of an error bar.
-_ERROR_BAR_STDERRS = 2.0
+_ERROR_BAR_HALF_LENGTH_IN_STDERRS = 2.0
 
 
 @partial(error_boundary, is_called_internally=True)
@@ -81,34 +81,37 @@ def plot_healing(
         raise DataError("the table contains no holds, so there is nothing to draw.")
     count = 1 if record is None else 2
     with style_context(style, width):
-        columns = fit_panel_columns(count)
+        columns = limit_panel_columns_to_width(count)
         rows = count // columns
         figure = NotebookFigure(
-            figsize=figure_size(columns, rows, _PANEL_HEIGHT_MM), layout="constrained"
+            figsize=compute_figure_size_in_inches(columns, rows, _PANEL_HEIGHT_MM),
+            layout="constrained",
         )
         panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
         if record is not None:
-            _draw_record(table, record, panels[0])
-        _draw_healing(table, panels[-1])
+            _draw_record_with_holds(table, record, panels[0])
+        _draw_healing_against_hold_duration(table, panels[-1])
         if count > 1:
             add_panel_letters(panels)
-        enlarge_for_legends(figure, [panels] if rows == 1 else [[panel] for panel in panels])
+        increase_figure_height_for_legends(
+            figure, [panels] if rows == 1 else [[panel] for panel in panels]
+        )
         finalize_layout(figure)
     return figure
 
 
-def _draw_record(table: xr.Dataset, record: Record, axes: Axes) -> None:
+def _draw_record_with_holds(hold_table: xr.Dataset, record: Record, axes: Axes) -> None:
     """Draw friction against load point displacement, and mark the measured values."""
     moved, friction = record.columns["displacement"], record.columns["friction"]
     thinned = slice(None, None, max(1, len(record) // _MAX_DRAWN_ROWS))
     axes.plot(moved[thinned], friction[thinned], ".", color="0.7", markersize=1.5, label="record")
-    stops = np.interp(table["begins"], record.time, moved)
-    starts = np.interp(table["begins"] + table["duration"], record.time, moved)
-    trend = float(table.get("trend", 0.0))
-    peaks = table["peak_friction"] + trend * table["peak_displacement"]
+    stops = np.interp(hold_table["begins"], record.time, moved)
+    starts = np.interp(hold_table["begins"] + hold_table["duration"], record.time, moved)
+    trend = float(hold_table.get("trend", 0.0))
+    peaks = hold_table["peak_friction"] + trend * hold_table["peak_displacement"]
     for x, y, marker, name in (
-        (stops, table["friction_before"], "v", "friction before the hold"),
-        (starts + table["peak_displacement"].values, peaks, "^", "peak friction"),
+        (stops, hold_table["friction_before"], "v", "friction before the hold"),
+        (starts + hold_table["peak_displacement"].values, peaks, "^", "peak friction"),
     ):
         axes.plot(x, y, marker, color=cycle_style(marker == "^")["color"], label=name)
     axes.set_xlabel(r"Load point displacement ($\mu$m)")
@@ -116,23 +119,23 @@ def _draw_record(table: xr.Dataset, record: Record, axes: Axes) -> None:
     add_legend(axes, 2)
 
 
-def _draw_healing(table: xr.Dataset, axes: Axes) -> None:
+def _draw_healing_against_hold_duration(hold_table: xr.Dataset, axes: Axes) -> None:
     """Draw healing and relaxation against the hold duration."""
-    duration = table["duration"].values
+    duration = hold_table["duration"].values
     for number, (name, label, sign) in enumerate(
         (
             ("healing", r"healing, $\Delta\mu$", 1.0),
             ("relaxation", r"relaxation, $-\Delta\mu_c$", -1.0),
         )
     ):
-        suffix = "stderr" if f"{name}_stderr" in table else "error"
-        error = table[f"{name}_{suffix}"].values
+        suffix = "stderr" if f"{name}_stderr" in hold_table else "error"
+        error = hold_table[f"{name}_{suffix}"].values
         axes.errorbar(
-            duration, sign * table[name].values, _ERROR_BAR_STDERRS * error, fmt="os"[number],
+            duration, sign * hold_table[name].values, _ERROR_BAR_HALF_LENGTH_IN_STDERRS * error, fmt="os"[number],
             color=cycle_style(number)["color"], markersize=3.5, label=label,
         )  # fmt: skip
     rate, stderr, level = (
-        float(table[n]) for n in ("healing_rate", "healing_rate_stderr", "healing_intercept")
+        float(hold_table[n]) for n in ("healing_rate", "healing_rate_stderr", "healing_intercept")
     )
     if math.isfinite(rate):
         ends = np.array([duration.min(), duration.max()])
@@ -140,7 +143,7 @@ def _draw_healing(table: xr.Dataset, axes: Axes) -> None:
         axes.plot(ends, level + rate * np.log10(ends), label=label, **cycle_style(0))
     if duration.min() < duration.max():
         set_log_scale(axes, "x")
-    units = table["duration"].attrs
+    units = hold_table["duration"].attrs
     unit = "$D_c/V_*$" if "scale" in units else units.get("units", "s")
     axes.set_xlabel(f"Duration of the hold ({unit})")
     axes.set_ylabel("Change of friction")

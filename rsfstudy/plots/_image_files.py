@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as Figure
 from rsfstudy._deprecation import accept_former_keyword_names
 
 #: Resolution of figures in notebooks, in dots per inch.
-_SCREEN_DPI = 150
+_NOTEBOOK_FIGURE_DPI = 150
 #: Metadata that remove the creation date from an image file, so that two files of the same figure
 #: are identical.
 _IMAGE_METADATA_WITHOUT_DATES: dict[str, dict[str, Any]] = {
@@ -50,7 +50,7 @@ class NotebookFigure(Figure):
     def _repr_png_(self) -> bytes:
         """Return the figure as a PNG image for notebooks."""
         image = io.BytesIO()
-        self.savefig(image, format="png", dpi=_SCREEN_DPI)
+        self.savefig(image, format="png", dpi=_NOTEBOOK_FIGURE_DPI)
         return image.getvalue()
 
 

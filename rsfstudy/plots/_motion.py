@@ -21,30 +21,34 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.plots._axes import set_log_scale
 from rsfstudy.plots._image_files import NotebookFigure
-from rsfstudy.plots._size import figure_size, fit_panel_columns, header_line_length
+from rsfstudy.plots._size import (
+    compute_figure_size_in_inches,
+    compute_max_header_line_length,
+    limit_panel_columns_to_width,
+)
 from rsfstudy.plots._style import (
     add_legend,
     add_panel_letters,
     cycle_style,
-    enlarge_for_legends,
     finalize_layout,
     freeze_tick_label_size,
+    increase_figure_height_for_legends,
     style_context,
 )
-from rsfstudy.plots._text import to_mathtext, wrap_text
+from rsfstudy.plots._text import convert_symbols_to_mathtext, wrap_text
 from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.slider import Scene
 from rsfstudy.storage import StoredDataset
 
 #: Height of a panel in mm.
-PANEL_HEIGHT_MM = 48.0
+MOTION_PANEL_HEIGHT_MM = 48.0
 NATURAL_LOG_OF_10 = math.log(10.0)
 #: Variables that can be drawn along x.
-ABSCISSA_VARIABLES = ("load_point_displacement", "slip", "time")
+X_AXIS_VARIABLES_OF_MOTION = ("load_point_displacement", "slip", "time")
 #: Relative change below which the load point displacement or the slip rate counts as constant.
 #: Smaller changes are due to rounding errors.
-_MAX_RELATIVE_CHANGE_OF_HELD_LOAD_POINT = 1e-6
-_FRICTION_LABEL = r"Friction coefficient, $\mu$"
+_MAX_RELATIVE_CHANGE_TREATED_AS_CONSTANT = 1e-6
+_FRICTION_AXIS_LABEL = r"Friction coefficient, $\mu$"
 
 
 @accept_former_keyword_names
@@ -106,55 +110,55 @@ def plot_motion(
     >>> len(figure.axes)
     3
     """
-    if against not in (None, *ABSCISSA_VARIABLES):
-        raise InvalidValue("against", against, "is unknown", choices=ABSCISSA_VARIABLES)
-    _check_motion(motion, against)
+    if against not in (None, *X_AXIS_VARIABLES_OF_MOTION):
+        raise InvalidValue("against", against, "is unknown", choices=X_AXIS_VARIABLES_OF_MOTION)
+    _check_motion_variables(motion, against)
     if not motion["slip"].notnull().any():
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
         raise DataError(f"the dataset contains no motion, so there is nothing to draw. {text}")
-    against = against or _choose_abscissa(motion)
+    against = against or _choose_x_variable(motion)
     shown = motion if rig is None else rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS)
     with style_context(style, width):
-        figure, upper, lower, plane = _create_motion_panels(fit_panel_columns(2))
+        figure, upper, lower, plane = _create_motion_panels(limit_panel_columns_to_width(2))
         for axes in figure.axes:
             freeze_tick_label_size(axes)
         if "friction_coefficient" in shown:
             upper.plot(shown[against], shown["friction_coefficient"])
-            upper.set_ylabel(_FRICTION_LABEL)
+            upper.set_ylabel(_FRICTION_AXIS_LABEL)
         else:
             upper.plot(shown[against], shown["shear_stress"])
             stress = shown["shear_stress"].assign_attrs(long_name="shear stress")
-            upper.set_ylabel(_axis_label(stress))
+            upper.set_ylabel(_format_axis_label_of_variable(stress))
         upper.tick_params(labelbottom=False)
         _draw_slip_rate(shown, lower, against)
-        lower.set_xlabel(_axis_label(shown[against]))
+        lower.set_xlabel(_format_axis_label_of_variable(shown[against]))
         _draw_phase_plane(motion, shown, plane)
         add_panel_letters(figure.axes)
         if header:
-            title = to_mathtext(_motion_title(motion))
-            figure.suptitle(wrap_text(title, header_line_length(figure)))
-        enlarge_for_legends(figure, [[upper], [lower], [plane]])
+            title = convert_symbols_to_mathtext(_format_motion_title(motion))
+            figure.suptitle(wrap_text(title, compute_max_header_line_length(figure)))
+        increase_figure_height_for_legends(figure, [[upper], [lower], [plane]])
         finalize_layout(figure)
     return figure
 
 
-def _create_motion_panels(columns: int) -> tuple[NotebookFigure, Axes, Axes, Axes]:
+def _create_motion_panels(column_count: int) -> tuple[NotebookFigure, Axes, Axes, Axes]:
     """Create a figure with empty panels for friction, slip rate and the phase plane.
 
     If there are two columns, the phase plane is to the right of the other panels. Otherwise, the
     phase plane is below the other panels.
     """
-    rows = 2 if columns == 2 else 3
-    size = figure_size(columns, rows, PANEL_HEIGHT_MM)
+    rows = 2 if column_count == 2 else 3
+    size = compute_figure_size_in_inches(column_count, rows, MOTION_PANEL_HEIGHT_MM)
     figure = NotebookFigure(figsize=size, layout="constrained")
-    grid = figure.add_gridspec(rows, columns)
+    grid = figure.add_gridspec(rows, column_count)
     upper = figure.add_subplot(grid[0, 0])
     lower = figure.add_subplot(grid[1, 0], sharex=upper)
-    plane = figure.add_subplot(grid[:, 1] if columns == 2 else grid[2, 0])
+    plane = figure.add_subplot(grid[:, 1] if column_count == 2 else grid[2, 0])
     return figure, upper, lower, plane
 
 
-def _check_motion(motion: xr.Dataset, abscissa: str | None) -> None:
+def _check_motion_variables(motion: xr.Dataset, x_variable: str | None) -> None:
     """Check that a dataset has the variables of a motion or a limit cycle.
 
     Raises
@@ -164,8 +168,8 @@ def _check_motion(motion: xr.Dataset, abscissa: str | None) -> None:
         slip rate exceeds the range of floating-point numbers.
     """
     stress = () if "friction_coefficient" in motion else ("shear_stress",)
-    needed = ("slip", abscissa or "time", "frictional_stress", "log10_slip_rate", *stress)
-    known = [name for name in ABSCISSA_VARIABLES if name in motion]
+    needed = ("slip", x_variable or "time", "frictional_stress", "log10_slip_rate", *stress)
+    known = [name for name in X_AXIS_VARIABLES_OF_MOTION if name in motion]
     for name in (*needed, _find_normal_stress_name(motion), *known):
         if name not in motion:
             text = "is missing. The dataset is neither a motion from simulate nor a limit cycle"
@@ -189,7 +193,7 @@ def _find_normal_stress_name(motion: xr.Dataset) -> str:
     return "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
 
 
-def _choose_abscissa(motion: xr.Dataset) -> str:
+def _choose_x_variable(motion: xr.Dataset) -> str:
     """Choose the variable along x.
 
     The function chooses the load point displacement, or the slip if the load point displacement is
@@ -199,13 +203,13 @@ def _choose_abscissa(motion: xr.Dataset) -> str:
     if "load_point_displacement" not in motion:
         return "time"
     pulled, slid = (np.asarray(motion[name]) for name in ("load_point_displacement", "slip"))
-    least = _MAX_RELATIVE_CHANGE_OF_HELD_LOAD_POINT * max(
+    least = _MAX_RELATIVE_CHANGE_TREATED_AS_CONSTANT * max(
         float(np.ptp(slid)), float(np.abs(pulled).max())
     )
     return "load_point_displacement" if np.ptp(pulled) > least else "slip"
 
 
-def _motion_title(motion: xr.Dataset) -> str:
+def _format_motion_title(motion: xr.Dataset) -> str:
     """Return the title of a motion, with the status if the motion ended early."""
     status = motion.attrs.get("status", "ok")
     ending = "" if status == "ok" else f" [{status}: {motion.attrs.get('message', '')}]"
@@ -213,14 +217,14 @@ def _motion_title(motion: xr.Dataset) -> str:
     return f"{title}{ending}"
 
 
-def _draw_slip_rate(displayed_motion: xr.Dataset, axes: Axes, abscissa: str) -> None:
+def _draw_slip_rate(displayed_motion: xr.Dataset, axes: Axes, x_variable: str) -> None:
     """Draw the slip rate, or its logarithm if the dataset has no slip rate."""
     if "slip_rate" in displayed_motion:
-        axes.plot(displayed_motion[abscissa], displayed_motion["slip_rate"])
+        axes.plot(displayed_motion[x_variable], displayed_motion["slip_rate"])
         # A constant slip rate needs explicit limits, because rounding errors would fill the panel.
         if (
             np.ptp(ends := axes.dataLim.intervaly)
-            < _MAX_RELATIVE_CHANGE_OF_HELD_LOAD_POINT * ends[1]
+            < _MAX_RELATIVE_CHANGE_TREATED_AS_CONSTANT * ends[1]
         ):
             axes.set_ylim(0.5 * ends[0], 2.0 * ends[1])
         set_log_scale(axes, "y")
@@ -229,7 +233,7 @@ def _draw_slip_rate(displayed_motion: xr.Dataset, axes: Axes, abscissa: str) -> 
             f"({_format_units(str(displayed_motion['slip_rate'].attrs.get('units', '1')))})"
         )
     else:
-        axes.plot(displayed_motion[abscissa], displayed_motion["log10_slip_rate"])
+        axes.plot(displayed_motion[x_variable], displayed_motion["log10_slip_rate"])
         axes.set_ylabel(r"Slip rate, $\log_{10}(V/V_*)$")
 
 
@@ -246,7 +250,7 @@ def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Ax
         scale * 10.0 ** logs[0], friction[0], "o", color=cycle_style(0)["color"], label="its start"
     )
     beyond = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
-    steady = _compute_steady_friction(StoredDataset(motion).scene_fields, beyond)
+    steady = _compute_steady_state_friction(StoredDataset(motion).scene_fields, beyond)
     if steady is not None:
         axes.plot(scale * 10.0**beyond, steady, "--", color="0.4", label="steady sliding")
     set_log_scale(axes, "x")
@@ -255,8 +259,8 @@ def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Ax
     add_legend(axes, 3)
 
 
-def _compute_steady_friction(
-    scene_fields: dict[str, Any], log10_rates: np.ndarray
+def _compute_steady_state_friction(
+    scene_fields: dict[str, Any], log10_slip_rates: np.ndarray
 ) -> np.ndarray | None:
     """Compute the steady-state friction coefficient.
 
@@ -270,12 +274,12 @@ def _compute_steady_friction(
         )
     except InvalidValue:
         return None
-    rates = log10_rates * NATURAL_LOG_OF_10
+    rates = log10_slip_rates * NATURAL_LOG_OF_10
     excess = [scene.steady_friction_minus_reference(x) for x in rates.tolist()]
     return np.asarray(scene.mu_star + np.array(excess))
 
 
-def _axis_label(values: xr.DataArray) -> str:
+def _format_axis_label_of_variable(values: xr.DataArray) -> str:
     """Return the label of an axis from the attributes of a variable."""
     name = str(values.attrs.get("long_name", values.name))
     name = name.removesuffix(" since the step") if "phase" in values.dims else name

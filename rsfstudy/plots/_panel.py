@@ -18,16 +18,16 @@ from matplotlib.axes import Axes
 
 from rsfstudy.errors import DataError
 from rsfstudy.plots._axes import (
-    add_colour_bar,
+    add_colour_bar_of_dimension,
     are_log_spaced,
     are_positive_and_span_decades,
+    compute_point_colours,
     describe_point,
     format_axis_label,
     has_numeric_points,
     label_rows,
-    point_colours,
     set_log_scale,
-    set_x_axis_of_dimension,
+    set_up_x_axis_for_dimension,
 )
 from rsfstudy.plots._style import (
     add_grey_legend_entry,
@@ -36,7 +36,7 @@ from rsfstudy.plots._style import (
     cycle_style,
     estimate_text_capacity_in_characters,
 )
-from rsfstudy.plots._text import format_slope, to_mathtext, wrap_text
+from rsfstudy.plots._text import convert_symbols_to_mathtext, format_slope, wrap_text
 from rsfstudy.status import Status
 from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
@@ -52,13 +52,13 @@ _LINE_AND_FILL_STYLES_OF_SECOND_HUE = (
 #: curve has more points than the second value, markers are omitted.
 _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
 #: Maximum number of decimal places of a slope.
-_SLOPE_DIGITS = 6
+_MAX_DECIMALS_OF_SLOPE = 6
 #: Width of the panel letter and of the y tick labels, in characters.
 _WIDTH_LEFT_OF_TITLE_IN_CHARACTERS = 10
 _ARRAY_OF_ONE_MISSING_VALUE = xr.DataArray(np.nan)
 
 
-def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
+def split_panel_by_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
     """Create one panel for each point of the lattice axes in ``facet``.
 
     Parameters
@@ -96,7 +96,7 @@ def _has_data(panel: Panel, dataset: xr.Dataset) -> bool:
     if isinstance(panel.y, str):
         return bool(part[panel.y].notnull().any() or (part["status"] == Status.OK).any())
     found = (
-        _evaluate_name_or_function(panel.y, row)
+        _evaluate_variable_or_function(panel.y, row)
         for row, _style in iterate_curves_and_styles(panel, part)
     )
     return any(np.isfinite(values.astype(float)).any() for values in found)
@@ -178,11 +178,11 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
             top = float(axes.dataLim.ymax)
             axes.set_ylim(top=max(axes.get_ylim()[1], top + 0.05 * (top - limits[0])))
     across, up = estimate_text_capacity_in_characters(axes)
-    if label := _axis_label(
+    if label := _format_panel_axis_label(
         panel.x, panel.x_label, part, across - _WIDTH_LEFT_OF_TITLE_IN_CHARACTERS
     ):
         axes.set_xlabel(label)
-    if label := _axis_label(panel.y, panel.y_label, part, up):
+    if label := _format_panel_axis_label(panel.y, panel.y_label, part, up):
         axes.set_ylabel(label)
     title = ", ".join(
         filter(None, [axes.get_title(), _resolve_text_or_function(panel.title, part, places)])
@@ -240,7 +240,9 @@ def iterate_curves_and_styles(
     """
     several = [d for d in panel.hue if panel_data.sizes[d] > 1]
     shades = (
-        None if callable(panel.style) or not panel.hue else _curve_colours(panel_data, panel.hue[0])
+        None
+        if callable(panel.style) or not panel.hue
+        else _compute_curve_colours(panel_data, panel.hue[0])
     )
     named = [d for d in panel.hue if shades is None or d != panel.hue[0]]
     for at in np.ndindex(*(panel_data.sizes[d] for d in panel.hue)):
@@ -251,7 +253,7 @@ def iterate_curves_and_styles(
             style |= {"color": shades[number], "linestyle": "-"}
         if panel.hue[1:] and panel.hue[1] in several:
             style |= _choose_style_of_second_hue_point(at[1])
-        style["label"] = _format_curve_name(panel, row, named[:1] if len(several) > 1 else named)
+        style["label"] = _format_curve_label(panel, row, named[:1] if len(several) > 1 else named)
         own = panel.style
         yield row, style | dict(own(row) if callable(own) else own)
 
@@ -272,7 +274,10 @@ def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> 
     """
     if panel.curve_label is None and len([d for d in panel.hue if panel_data.sizes[d] > 1]) > 1:
         second = panel.hue[1]
-        shades = not callable(panel.style) and _curve_colours(panel_data, panel.hue[0]) is not None
+        shades = (
+            not callable(panel.style)
+            and _compute_curve_colours(panel_data, panel.hue[0]) is not None
+        )
         own = {} if callable(panel.style) else dict(panel.style)
         line = {"linestyle": "none"} if panel.markers_only else {}
         for number in range(panel_data.sizes[second] if not shades else 0):
@@ -282,7 +287,7 @@ def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> 
             )
 
 
-def _curve_colours(panel_data: xr.Dataset, dimension: str) -> np.ndarray | None:
+def _compute_curve_colours(panel_data: xr.Dataset, dimension: str) -> np.ndarray | None:
     """Return the colours of a numeric axis with many points.
 
     The result is None if the axis has few points or is not numeric.
@@ -290,22 +295,22 @@ def _curve_colours(panel_data: xr.Dataset, dimension: str) -> np.ndarray | None:
     long = panel_data.sizes[dimension] > _MIN_POINTS_FOR_COLOUR_SCALE and has_numeric_points(
         panel_data, dimension
     )
-    return point_colours(panel_data, dimension) if long else None
+    return compute_point_colours(panel_data, dimension) if long else None
 
 
-def _format_curve_name(
+def _format_curve_label(
     panel: Panel, curve_data: xr.Dataset, dimensions: Sequence[str]
 ) -> str | None:
     """Return the legend label of a curve, including its slope if available."""
     name = (
-        to_mathtext(panel.curve_label(curve_data))
+        convert_symbols_to_mathtext(panel.curve_label(curve_data))
         if panel.curve_label
         else ", ".join(describe_point(curve_data, d) for d in dimensions) or None
     )
     if name is None or not np.isfinite(curve_data.get(f"{panel.annotation}_stderr", np.nan)):
         return name
     symbol = find_quantity(panel.annotation, read_quantities_not_in_vocabulary(curve_data)).symbol
-    slope = f"{symbol} = {format_slope(curve_data, panel.annotation, _SLOPE_DIGITS)}".removeprefix(
+    slope = f"{symbol} = {format_slope(curve_data, panel.annotation, _MAX_DECIMALS_OF_SLOPE)}".removeprefix(
         " = "
     )
     # The equation is a single formula, so that a line break at the equals sign is impossible.
@@ -323,8 +328,8 @@ def _draw_curve(
         If the x and y values are not one-dimensional arrays of the same size.
     """
     values = (
-        _evaluate_name_or_function(panel.x, curve_data),
-        _evaluate_name_or_function(panel.y, curve_data),
+        _evaluate_variable_or_function(panel.x, curve_data),
+        _evaluate_variable_or_function(panel.y, curve_data),
     )
     if values[0].shape != values[1].shape or values[0].ndim != 1:
         shapes = " and ".join(f"shape {found.shape}" for found in values)
@@ -354,17 +359,17 @@ def _draw_curve(
         axes.plot(*line, **style | {"linewidth": 0.9, "markevery": []})
     if panel.error_bars:
         bars = {"fmt": "none", "ecolor": style["color"], "elinewidth": 0.8, "capsize": 3}
-        axes.errorbar(x, y, _evaluate_name_or_function(panel.error_bars, curve_data), **bars)
+        axes.errorbar(x, y, _evaluate_variable_or_function(panel.error_bars, curve_data), **bars)
     return y
 
 
-def _evaluate_name_or_function(name_or_function: Any, curve_data: xr.Dataset) -> np.ndarray:
+def _evaluate_variable_or_function(variable_or_function: Any, curve_data: xr.Dataset) -> np.ndarray:
     """Return the values of a variable, or the result of a function."""
     return np.atleast_1d(
         np.asarray(
-            name_or_function(curve_data)
-            if callable(name_or_function)
-            else curve_data[name_or_function]
+            variable_or_function(curve_data)
+            if callable(variable_or_function)
+            else curve_data[variable_or_function]
         )
     )
 
@@ -387,11 +392,13 @@ def _find_indices_of_selected_points(points: xr.DataArray, index_or_function: An
     )
 
 
-def _set_axis_scales(panel: Panel, panel_data: xr.Dataset, axes: Axes, values: np.ndarray) -> None:
+def _set_axis_scales(
+    panel: Panel, panel_data: xr.Dataset, axes: Axes, y_values: np.ndarray
+) -> None:
     """Set the scales of a panel, set tick labels and add a colour bar."""
     named = isinstance(panel.x, str) and panel_data[panel.x].dtype.kind not in "fiu"
     if named:
-        set_x_axis_of_dimension(axes, panel_data, str(panel.x))
+        set_up_x_axis_for_dimension(axes, panel_data, str(panel.x))
     if isinstance(panel.y, str) and panel_data[panel.y].dtype.kind in "OU":
         label_rows(axes, list(map(str, panel_data[panel.y].values)))
     log = panel.log
@@ -399,16 +406,20 @@ def _set_axis_scales(panel: Panel, panel_data: xr.Dataset, axes: Axes, values: n
         along = isinstance(panel.x, str) and panel.x in panel_data.coords and not named
         log = "x" * (
             along and are_log_spaced(panel_data[panel.x].values)
-        ) + "y" * are_positive_and_span_decades(values)
+        ) + "y" * are_positive_and_span_decades(y_values)
     positive = {"x": axes.dataLim.minposx, "y": axes.dataLim.minposy}
     axes.set(**{f"{which}scale": "log" for which in log if math.isfinite(positive[which])})
     first = next(iter(panel.hue), "")
-    if first and not callable(panel.style) and _curve_colours(panel_data, first) is not None:
-        add_colour_bar(panel_data, axes, first)
+    if (
+        first
+        and not callable(panel.style)
+        and _compute_curve_colours(panel_data, first) is not None
+    ):
+        add_colour_bar_of_dimension(panel_data, axes, first)
 
 
-def _axis_label(
-    name_or_function: Any, declared_label: Any, panel_data: xr.Dataset, max_line_characters: int
+def _format_panel_axis_label(
+    variable_or_function: Any, declared_label: Any, panel_data: xr.Dataset, max_line_characters: int
 ) -> str:
     """Return the label of an axis, wrapped to the width of the panel."""
     if declared_label is not None:
@@ -416,8 +427,8 @@ def _axis_label(
             _resolve_text_or_function(declared_label, panel_data, ""), max_line_characters
         )
     return (
-        format_axis_label(panel_data, name_or_function, max_line_characters)
-        if isinstance(name_or_function, str) and name_or_function
+        format_axis_label(panel_data, variable_or_function, max_line_characters)
+        if isinstance(variable_or_function, str) and variable_or_function
         else ""
     )
 

@@ -27,13 +27,15 @@ _MIN_FIGURE_WIDTH_MM, _MAX_FIGURE_WIDTH_MM = 60.0, 600.0
 #: row has fewer panels.
 _MIN_PANEL_WIDTH_MM = 55.0
 #: Width of a letter of a header relative to the font size.
-_LETTER_WIDTH = 0.58
+_LETTER_WIDTH_OVER_FONT_SIZE = 0.58
 #: Width of figures in mm that the user requested, or None.
-_requested_width_mm: ContextVar[float | None] = ContextVar("requested_width_mm", default=None)
+_requested_figure_width_mm: ContextVar[float | None] = ContextVar(
+    "requested_width_mm", default=None
+)
 
 
 @contextlib.contextmanager
-def width_context(width: Any) -> Iterator[None]:
+def figure_width_context(width: Any) -> Iterator[None]:
     """Set the width of the figures that are created inside a ``with`` block.
 
     Parameters
@@ -55,11 +57,11 @@ def width_context(width: Any) -> Iterator[None]:
     if width is None:
         yield
         return
-    token = _requested_width_mm.set(_convert_width_to_mm(width))
+    token = _requested_figure_width_mm.set(_convert_width_to_mm(width))
     try:
         yield
     finally:
-        _requested_width_mm.reset(token)
+        _requested_figure_width_mm.reset(token)
 
 
 def _convert_width_to_mm(width: Any) -> float:
@@ -72,7 +74,7 @@ def _convert_width_to_mm(width: Any) -> float:
     return width_mm
 
 
-def figure_size(
+def compute_figure_size_in_inches(
     panel_columns: int, panel_rows: int, panel_height_mm: float | None = None
 ) -> tuple[float, float]:
     """Compute the size of a figure in inches.
@@ -96,14 +98,14 @@ def figure_size(
     """
     width, usual = rcParams["figure.figsize"]
     each = usual if panel_height_mm is None else panel_height_mm / _MM_PER_INCH
-    if (requested := _requested_width_mm.get()) is not None:
+    if (requested := _requested_figure_width_mm.get()) is not None:
         width = requested / _MM_PER_INCH
     elif panel_columns > 1:
         width = 2.0 * width + _JOURNAL_COLUMN_GAP_MM / _MM_PER_INCH
     return width, panel_rows * each
 
 
-def fit_panel_columns(panel_columns: int) -> int:
+def limit_panel_columns_to_width(panel_columns: int) -> int:
     """Return the number of columns of panels that fit into the requested width.
 
     Parameters
@@ -116,13 +118,13 @@ def fit_panel_columns(panel_columns: int) -> int:
     int
         Number of columns, at most ``panel_columns``.
     """
-    width = _requested_width_mm.get()
+    width = _requested_figure_width_mm.get()
     if width is None:
         return panel_columns
     return min(panel_columns, max(1, int(width / _MIN_PANEL_WIDTH_MM)))
 
 
-def header_line_length(figure: Figure) -> int:
+def compute_max_header_line_length(figure: Figure) -> int:
     """Return the number of characters that fit into a line above the panels.
 
     Parameters
@@ -135,11 +137,11 @@ def header_line_length(figure: Figure) -> int:
     int
         Number of characters.
     """
-    letter_width = _LETTER_WIDTH * _font_size_of_header() / 72.0
+    letter_width = _LETTER_WIDTH_OVER_FONT_SIZE * _find_header_font_size() / 72.0
     return int(figure.get_figwidth() / letter_width)
 
 
-def _font_size_of_header() -> float:
+def _find_header_font_size() -> float:
     """Return the font size of the header in points."""
     size = rcParams["figure.titlesize"]
     return float(size) if isinstance(size, int | float) else float(rcParams["font.size"])

@@ -29,11 +29,11 @@ from matplotlib.transforms import blended_transform_factory, offset_copy
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue, RsfStudyError, shorten_text
-from rsfstudy.plots._size import width_context
-from rsfstudy.plots._text import visible_length, wrap_text
+from rsfstudy.plots._size import figure_width_context
+from rsfstudy.plots._text import estimate_visible_length, wrap_text
 
 #: Default style sheet of rsfstudy.
-STYLE_SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
+DEFAULT_STYLE_SHEET_PATH = Path(__file__).with_name("rsfstudy.mplstyle")
 #: File name suffix of style sheets.
 _STYLE_SHEET_SUFFIX = ".mplstyle"
 _MARKER_CYCLE = "os^Dv<>P*X"
@@ -79,7 +79,7 @@ def style_context(user_styles: Any = None, width: Any = None) -> Iterator[None]:
     """
     others = user_styles if isinstance(user_styles, list | tuple) else [user_styles]
     settings = [_to_matplotlib_style(other) for other in others if other is not None]
-    with style.context([STYLE_SHEET, *settings]), width_context(width):
+    with style.context([DEFAULT_STYLE_SHEET_PATH, *settings]), figure_width_context(width):
         try:
             yield
         except (RsfStudyError, OSError):
@@ -103,7 +103,7 @@ def _to_matplotlib_style(user_style: Any) -> str | dict[str, Any]:
     from a URL, or parse any text file with one warning per line.
     """
     if isinstance(user_style, Mapping):
-        return _validate_settings(user_style)
+        return _validate_matplotlib_settings(user_style)
     if isinstance(user_style, str) and user_style in ("default", *style.available):
         return user_style
     if isinstance(user_style, str | Path) and Path(user_style).suffix == _STYLE_SHEET_SUFFIX:
@@ -119,7 +119,7 @@ def _format_style_for_message(user_style: Any) -> Any:
     return str(user_style) if isinstance(user_style, Path) else user_style
 
 
-def _validate_settings(settings: Mapping[Any, Any]) -> dict[str, Any]:
+def _validate_matplotlib_settings(settings: Mapping[Any, Any]) -> dict[str, Any]:
     """Validate matplotlib settings and convert their values.
 
     Raises
@@ -158,7 +158,7 @@ def _read_style_sheet(path: Path) -> dict[str, Any]:
         try:
             if not colon:
                 raise InvalidValue("style", line, "must have the form NAME: VALUE")
-            settings |= _validate_settings({name.strip(): _strip_quotes(value.strip())})
+            settings |= _validate_matplotlib_settings({name.strip(): _strip_quotes(value.strip())})
         except InvalidValue as error:
             raise error.with_location(f"{path}, line {number}") from error
     return settings
@@ -262,7 +262,7 @@ def estimate_text_capacity_in_characters(axes: Axes) -> tuple[int, int]:
     up : int
         Number of characters along y, at least 12.
     """
-    figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent_in_figure(axes)
+    figure, (left, right) = cast(Figure, axes.figure), _compute_horizontal_extent_of_panel(axes)
     place = axes.get_subplotspec()
     rows = 1 if place is None else place.get_gridspec().nrows
     width, height = figure.get_size_inches()
@@ -290,12 +290,12 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
     title : str, optional
         Title of the legend.
     """
-    shown = _legend_entries(axes)
+    shown = _find_visible_artists_by_label(axes)
     if not shown:
         return
     lines = axes.get_xlabel().count("\n") + _estimate_tick_label_line_count(axes)
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
-    figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent_in_figure(axes)
+    figure, (left, right) = cast(Figure, axes.figure), _compute_horizontal_extent_of_panel(axes)
     # If the legend extended below the colour bar, the layout engine would reduce the width of the
     # panel.
     if getattr(axes, "_colorbars", ()):
@@ -308,7 +308,9 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
         bbox_transform=blended_transform_factory(figure.transFigure, below),
         title=title,
     )
-    _fit_legend_to_width(made, shown, legend_columns, 0.97 * (right - left) * figure.bbox.width)
+    _create_legend_that_fits_width(
+        made, shown, legend_columns, 0.97 * (right - left) * figure.bbox.width
+    )
 
 
 def _estimate_tick_label_line_count(axes: Axes) -> float:
@@ -321,18 +323,18 @@ def _estimate_tick_label_line_count(axes: Axes) -> float:
     return max([1.0, *map(lines, axes.get_xticklabels())])
 
 
-def _legend_entries(axes: Axes) -> dict[str, Any]:
+def _find_visible_artists_by_label(axes: Axes) -> dict[str, Any]:
     """Return a dictionary of the visible artists, keyed by their labels."""
     named: dict[str, Any] = {}
     # The handle of an entry is as wide as about six characters.
     longest = min(48, estimate_text_capacity_in_characters(axes)[0] - 6)
     for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-        if _is_visible(handle):
+        if _has_visible_data(handle):
             named.setdefault(wrap_text(label, longest), handle)
     return named
 
 
-def _fit_legend_to_width(
+def _create_legend_that_fits_width(
     make_legend: Callable[..., Legend],
     handles_by_label: Mapping[str, Any],
     max_columns: int,
@@ -385,7 +387,7 @@ def add_grey_legend_entry(axes: Axes, name: str, style: Mapping[str, Any]) -> No
     axes.add_artist(Line2D([-1.0], [-1.0], transform=axes.transAxes, label=name, **line))
 
 
-def _horizontal_extent_in_figure(axes: Axes) -> tuple[float, float]:
+def _compute_horizontal_extent_of_panel(axes: Axes) -> tuple[float, float]:
     """Return the left and right limits of the space available to a panel.
 
     The limits are fractions of the figure width.
@@ -397,15 +399,15 @@ def _horizontal_extent_in_figure(axes: Axes) -> tuple[float, float]:
     return place.colspan.start / columns, place.colspan.stop / columns
 
 
-def _is_visible(handle: Any) -> bool:
+def _has_visible_data(artist: Any) -> bool:
     """Return True if an artist has visible data."""
-    if isinstance(handle, ErrorbarContainer):
-        handle = handle.lines[0]
-    if isinstance(handle, Line2D):
-        points = np.asarray(handle.get_xydata(), dtype=float)
+    if isinstance(artist, ErrorbarContainer):
+        artist = artist.lines[0]
+    if isinstance(artist, Line2D):
+        points = np.asarray(artist.get_xydata(), dtype=float)
         return bool(np.isfinite(points).all(axis=1).any())
-    if isinstance(handle, PathCollection):
-        return np.size(handle.get_offsets()) > 0
+    if isinstance(artist, PathCollection):
+        return np.size(artist.get_offsets()) > 0
     return True
 
 
@@ -423,7 +425,9 @@ def merge_common_legends(figure: Figure, panel_axes: Sequence[Axes]) -> None:
     panel_axes : sequence of matplotlib.axes.Axes
         Panels of the figure.
     """
-    named = {panel: _legend_entries(panel) for panel in panel_axes if panel.get_legend()}
+    named = {
+        panel: _find_visible_artists_by_label(panel) for panel in panel_axes if panel.get_legend()
+    }
     alike: list[Axes] = []
     for fullest in named:
         within = [panel for panel, texts in named.items() if texts.keys() <= named[fullest].keys()]
@@ -440,10 +444,12 @@ def merge_common_legends(figure: Figure, panel_axes: Sequence[Axes]) -> None:
         place: Any = "outside lower center"
         return figure.legend(shown, texts, loc=place, ncols=ncols, title=title)
 
-    _fit_legend_to_width(made, named[chosen], 5, figure.bbox.width)
+    _create_legend_that_fits_width(made, named[chosen], 5, figure.bbox.width)
 
 
-def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) -> None:
+def increase_figure_height_for_legends(
+    figure: Figure, panel_rows: Sequence[Sequence[Axes]]
+) -> None:
     """Increase the figure height by the height of its legends, header and long labels.
 
     The additional height ensures that legends, headers and long labels do not reduce the height of
@@ -458,7 +464,8 @@ def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) ->
     """
     beside = [[legend for panel in row if (legend := panel.get_legend())] for row in panel_rows]
     heights = [
-        max(map(_legend_height, legends), default=0.0) for legends in (*beside, figure.legends)
+        max(map(_measure_legend_height, legends), default=0.0)
+        for legends in (*beside, figure.legends)
     ]
     line = 1.3 * float(rcParams["font.size"]) / 72.0
     lines = [max(map(_estimate_tick_label_line_count, row)) - 1.0 for row in panel_rows]
@@ -468,7 +475,7 @@ def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) ->
     figure.set_figheight(figure.get_figheight() + sum(heights) + line * sum(lines))
 
 
-def _legend_height(legend: Legend) -> float:
+def _measure_legend_height(legend: Legend) -> float:
     """Return the height of a legend in inches.
 
     The height includes a margin of 1.5 times the font size.
@@ -512,11 +519,11 @@ def finalize_layout(figure: Figure) -> None:
         return
     layout.execute(figure)
     for axes in figure.axes:
-        _wrap_title(axes)
+        _wrap_panel_title(axes)
     layout.execute(figure)
 
 
-def _wrap_title(axes: Axes) -> None:
+def _wrap_panel_title(axes: Axes) -> None:
     """Wrap the title of a panel if the title is too long for one line.
 
     A title must not extend beyond the figure or overlap the letter of the panel. The available
@@ -528,6 +535,6 @@ def _wrap_title(axes: Axes) -> None:
     left = panel.x0 if axes.get_title(loc="left") else edges.x0
     free = 1.9 * min(middle - left, edges.x1 - middle)
     if title.get_text() and extent.width > free:
-        longest = max(map(visible_length, title.get_text().split("\n")))
+        longest = max(map(estimate_visible_length, title.get_text().split("\n")))
         text = title.get_text().replace("\n", " ")
         title.set_text(wrap_text(text, int(0.95 * longest * free / extent.width)))

@@ -12,15 +12,15 @@ from matplotlib.mathtext import MathTextParser
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.quantities import Quantity
 
-_MATH_PARSER = MathTextParser("path")
+_MATHTEXT_PARSER = MathTextParser("path")
 _MATHTEXT_PATTERN = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")
 _NUMBER_PATTERN = re.compile(r"-?[\d.,]*\d")
 _WORD_PATTERN = re.compile(rf"(?:{_MATHTEXT_PATTERN.pattern[1:-1]}|\\\$|[^\s$])+")
 #: Non-breaking space.
-_UNBREAKABLE_SPACE = r"$\ $"
+_NON_BREAKING_SPACE = r"$\ $"
 
 #: Patterns of symbols in datasets, and their replacements in mathtext.
-_SYMBOL_REPLACEMENTS: tuple[tuple[str, str], ...] = (
+_MATHTEXT_REPLACEMENTS_OF_SYMBOLS: tuple[tuple[str, str], ...] = (
     (r"\bk_cr\(V_\*\)", r"$k_{cr}(V_*)$"),
     (r"\ba/\(b-a\)", r"$a/(b-a)$"),
     (r"\bb/a\b", r"$b/a$"),
@@ -66,7 +66,7 @@ _SHORT_AXIS_NAMES_OF_QUANTITIES = {
 }
 
 
-def to_mathtext(text: Any) -> str:
+def convert_symbols_to_mathtext(text: Any) -> str:
     """Convert the symbols in a string to mathtext.
 
     Underscores outside formulas are replaced by spaces. Formulas between dollar signs are not
@@ -88,13 +88,14 @@ def to_mathtext(text: Any) -> str:
         else [str(text).replace("$", r"\$")]
     )
     return "".join(
-        part if _MATHTEXT_PATTERN.fullmatch(part) else _replace_symbols(part) for part in parts
+        part if _MATHTEXT_PATTERN.fullmatch(part) else _replace_symbols_outside_formulas(part)
+        for part in parts
     )
 
 
-def _replace_symbols(text: str) -> str:
+def _replace_symbols_outside_formulas(text: str) -> str:
     """Replace symbols and underscores outside formulas."""
-    for found, written in _SYMBOL_REPLACEMENTS:
+    for found, written in _MATHTEXT_REPLACEMENTS_OF_SYMBOLS:
         pieces = _MATHTEXT_PATTERN.split(text)
         text = "".join(
             p if _MATHTEXT_PATTERN.fullmatch(p) else re.sub(found, written, p) for p in pieces
@@ -108,7 +109,7 @@ def _is_valid_mathtext(text: str) -> bool:
     if text.count("$") % 2:
         return False
     try:
-        _MATH_PARSER.parse(text)
+        _MATHTEXT_PARSER.parse(text)
     except ValueError:
         return False
     return True
@@ -144,13 +145,16 @@ def wrap_text(text: str, max_line_characters: int) -> str:
             words.append(word)
     lines: list[list[str]] = [[]]
     for word in words:
-        if lines[-1] and visible_length(" ".join([*lines[-1], word])) > max_line_characters:
+        if (
+            lines[-1]
+            and estimate_visible_length(" ".join([*lines[-1], word])) > max_line_characters
+        ):
             lines.append([])
         lines[-1].append(word)
     return "\n".join(" ".join(line) for line in lines)
 
 
-def visible_length(text: str) -> int:
+def estimate_visible_length(text: str) -> int:
     """Estimate the number of visible characters of a string.
 
     Parameters
@@ -189,12 +193,12 @@ def format_quantity_axis_label(quantity: Quantity, max_line_characters: int = 45
         if quantity.units not in ("", "1")
         else quantity.scale * (not quantity.symbol)
     )
-    text = to_mathtext(text) + (
-        f"{_UNBREAKABLE_SPACE}({format_units(units).replace(' ', _UNBREAKABLE_SPACE)})"
+    text = convert_symbols_to_mathtext(text) + (
+        f"{_NON_BREAKING_SPACE}({format_units(units).replace(' ', _NON_BREAKING_SPACE)})"
         if units
         else ""
     )
-    return wrap_text(text, max_line_characters).replace(_UNBREAKABLE_SPACE, " ")
+    return wrap_text(text, max_line_characters).replace(_NON_BREAKING_SPACE, " ")
 
 
 def format_units(units: str) -> str:
@@ -211,10 +215,10 @@ def format_units(units: str) -> str:
         Units in mathtext, with powers as superscripts.
     """
     powers = re.sub(r"(\b[a-zA-Z]+|\))(-?\d)\b", r"\1$^{\2}$", units)
-    return to_mathtext(re.sub(r"\bum\b", r"$\\mu$m", powers))
+    return convert_symbols_to_mathtext(re.sub(r"\bum\b", r"$\\mu$m", powers))
 
 
-def quantity_symbol(quantity: Quantity) -> str:
+def find_quantity_symbol_or_name(quantity: Quantity) -> str:
     """Return the symbol of a quantity, or its name if there is no symbol.
 
     Parameters
@@ -227,7 +231,7 @@ def quantity_symbol(quantity: Quantity) -> str:
     str
         Symbol or name in mathtext.
     """
-    return to_mathtext(quantity.symbol or quantity.name)
+    return convert_symbols_to_mathtext(quantity.symbol or quantity.name)
 
 
 def format_number(value: float, digits: int = 3) -> str:
@@ -257,10 +261,10 @@ def format_number(value: float, digits: int = 3) -> str:
     text = f"{value:.{digits}g}"
     if "e" in text and 1.0 <= abs(float(text)) < 1e5:
         text = f"{float(text):,.0f}"
-    return to_mathtext(text)
+    return convert_symbols_to_mathtext(text)
 
 
-def format_with_error(value: float, error: float, max_decimals: int | None = None) -> str:
+def format_value_with_error(value: float, error: float, max_decimals: int | None = None) -> str:
     r"""Format a value and its error, rounded to the first digit of the error.
 
     The formatted value has at least one decimal place.
@@ -320,7 +324,7 @@ def format_slope(row: xr.Dataset, name: str, max_decimals: int | None = None) ->
     $0.664 \pm 0.002$
     """
     numerical = float(row[f"{name}_error"]) if f"{name}_error" in row else 0.0
-    return format_with_error(
+    return format_value_with_error(
         float(row[name]), float(row[f"{name}_stderr"]) + numerical, max_decimals
     )
 

@@ -33,7 +33,7 @@ _MARGIN_FRACTION_BESIDE_RECORD = 0.02
 _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
 #: Maximum number of parameters of a correlation matrix whose cells contain numbers. A colour bar
 #: replaces the numbers in larger matrices.
-_MAX_PARAMETERS_WITH_NUMBERS = 8
+_MAX_PARAMETERS_WITH_WRITTEN_VALUES = 8
 #: Margin above and below the visible curves as a fraction of their range.
 _Y_MARGIN_FRACTION = 0.05
 #: Half width of the confidence band of the fitted curve, in standard errors.
@@ -48,7 +48,7 @@ _LINE_STYLE_OF_RECORD_ROWS: dict[str, Any] = {
 _DISPLACEMENT_LABEL = r"Load point displacement ($\mu$m)"
 
 
-def panels(dataset: xr.Dataset) -> Sequence[Panel]:
+def build_panels_of_figure(dataset: xr.Dataset) -> Sequence[Panel]:
     """Build the panels of the figure of a fit.
 
     Parameters
@@ -68,7 +68,7 @@ def panels(dataset: xr.Dataset) -> Sequence[Panel]:
     """
     records = dataset.sizes.get("record", 1)
     part, record = ([d] if d in dataset.dims else [] for d in ("part", "record"))
-    named = Panel(title=partial(_record_title, records), x_label=_DISPLACEMENT_LABEL)
+    named = Panel(title=partial(_format_record_title, records), x_label=_DISPLACEMENT_LABEL)
     of_record = [
         replace(
             named,
@@ -84,23 +84,29 @@ def panels(dataset: xr.Dataset) -> Sequence[Panel]:
         replace(first, overlays=[_draw_residuals], y_label="Residual friction"),
         replace(
             first,
-            overlays=[_draw_autocorrelation],
-            title=_step_title,
+            overlays=[_draw_autocorrelation_of_residuals],
+            title=_format_loading_step_title,
             x_label="Lag (rows)",
             y_label="Autocorrelation of residuals",
         ),
-        Panel(isel=first.isel, overlays=[_draw_correlation], title=_correlation_title),
+        Panel(
+            isel=first.isel,
+            overlays=[_draw_parameter_correlation_matrix],
+            title=_format_correlation_title,
+        ),
     )
 
 
-def _record_title(records: int, dataset: xr.Dataset) -> str:
+def _format_record_title(record_count: int, dataset: xr.Dataset) -> str:
     """Return the name of the record if there are several records."""
-    if records == 1:
+    if record_count == 1:
         return ""
-    return f"{dataset['record'].item()}{f' (of {records})' * (records > _MAX_RECORD_PANELS)}"
+    return (
+        f"{dataset['record'].item()}{f' (of {record_count})' * (record_count > _MAX_RECORD_PANELS)}"
+    )
 
 
-def _step_title(dataset: xr.Dataset) -> str:
+def _format_loading_step_title(dataset: xr.Dataset) -> str:
     """Return the title of the first step if there are several steps."""
     if "step" not in dataset.dims:
         return ""
@@ -112,7 +118,7 @@ def _count_of_steps(dataset: xr.Dataset) -> str:
     return f" (of {dataset.sizes['step']})" if dataset.sizes.get("step", 1) > 1 else ""
 
 
-def _iterate_fits_with_law(
+def _iterate_fits_and_law_descriptions(
     dataset: xr.Dataset, *, only_first_step: bool = False
 ) -> Iterator[tuple[xr.Dataset, str, int]]:
     """Iterate over the fits of a record.
@@ -129,7 +135,7 @@ def _iterate_fits_with_law(
             yield one, describe_point(one, "law"), number
 
 
-def _select_thinned_columns_of_fit(
+def _extract_thinned_columns_of_fit(
     fit: xr.Dataset, column_names: Sequence[str]
 ) -> list[np.ndarray]:
     """Return the columns of a fit without rows that have missing values.
@@ -153,15 +159,17 @@ def _iterate_columns_of_fit_windows(
     late = np.diff(fit["record_time"].values[rows]) > 0.0
     for part in np.split(rows, np.flatnonzero((np.diff(rows) > 1) | ~late) + 1):
         if len(part):
-            yield _select_thinned_columns_of_fit(fit.isel(row=part), column_names)
+            yield _extract_thinned_columns_of_fit(fit.isel(row=part), column_names)
 
 
 def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw a record with the fitted curves and their confidence bands."""
     windows = []
-    for number, (one, name, law) in enumerate(_iterate_fits_with_law(dataset)):
+    for number, (one, name, law) in enumerate(_iterate_fits_and_law_descriptions(dataset)):
         if not number:
-            record = _select_thinned_columns_of_fit(one, ("record_displacement", "record_friction"))
+            record = _extract_thinned_columns_of_fit(
+                one, ("record_displacement", "record_friction")
+            )
             axes.plot(*record, label="record", **_LINE_STYLE_OF_RECORD_ROWS)
         names = "record_displacement", "fitted_friction", "fitted_friction_stderr"
         style = cycle_style(law) | {"marker": "", "label": name, "linewidth": 1.2, "zorder": 3}
@@ -185,13 +193,13 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
             max(min(windows) - beside, float(np.min(record[0])) - pad),
             min(max(windows) + beside, float(np.max(record[0])) + pad),
         )
-        _fit_y_limits_to_visible_lines(axes)
+        _set_y_limits_to_visible_lines(axes)
     # The bands have the colours of the laws, so the legend entry is grey.
     said = rf"$\pm${_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS:g} standard errors"
     add_grey_legend_entry(axes, said, {"linewidth": 5.0, "alpha": 0.3})
 
 
-def _fit_y_limits_to_visible_lines(axes: Axes) -> None:
+def _set_y_limits_to_visible_lines(axes: Axes) -> None:
     """Set the y limits to the range of the curves and records inside the x limits."""
     left, right = axes.get_xlim()
     visible = []
@@ -211,7 +219,7 @@ def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
     """
     previous_end, end, overlap = dict[int, float](), dict[int, float](), False
     axes.axhline(0.0, color="0.5", lw=0.8, zorder=2)
-    for one, name, law in _iterate_fits_with_law(dataset):
+    for one, name, law in _iterate_fits_and_law_descriptions(dataset):
         style = cycle_style(law) | {"label": name, "marker": "", "linewidth": 1.0, "zorder": 3}
         previous_end[law] = end.get(law, -math.inf)
         for x, y in _iterate_columns_of_fit_windows(one, ("record_displacement", "residual")):
@@ -230,11 +238,11 @@ def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
         add_grey_legend_entry(axes, "overlap of windows", {"alpha": 0.35})
 
 
-def _draw_autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
+def _draw_autocorrelation_of_residuals(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the autocorrelation of residuals and of whitened residuals."""
     axes.axhline(0.0, color="0.5", lw=0.8)
-    for one, name, law in _iterate_fits_with_law(dataset, only_first_step=True):
-        left, whitened = _select_thinned_columns_of_fit(one, ("residual", "whitened_residual"))
+    for one, name, law in _iterate_fits_and_law_descriptions(dataset, only_first_step=True):
+        left, whitened = _extract_thinned_columns_of_fit(one, ("residual", "whitened_residual"))
         if len(left) <= _MAX_AUTOCORRELATION_LAGS:
             continue
         style = cycle_style(law) | {"marker": ""}
@@ -246,16 +254,16 @@ def _draw_autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
     add_grey_legend_entry(axes, "whitened residuals", {"linestyle": ":"})
 
 
-def _compute_autocorrelation(values: np.ndarray) -> np.ndarray:
+def _compute_autocorrelation(residuals: np.ndarray) -> np.ndarray:
     """Compute the autocorrelation at all lags up to the maximum lag."""
-    seen = values - values.mean()
+    seen = residuals - residuals.mean()
     size = float(seen @ seen) or 1.0
     return np.array(
         [1.0, *(seen[lag:] @ seen[:-lag] / size for lag in range(1, _MAX_AUTOCORRELATION_LAGS + 1))]
     )
 
 
-def _correlation_title(dataset: xr.Dataset) -> str:
+def _format_correlation_title(dataset: xr.Dataset) -> str:
     """Return the title of the correlation panel with the first step and friction law names."""
     step = f", step {dataset['step'].values[0]:g}" if "step" in dataset.dims else ""
     laws = [describe_point(dataset.isel(law=n), "law") for n in range(dataset.sizes["law"])][:2]
@@ -265,35 +273,38 @@ def _correlation_title(dataset: xr.Dataset) -> str:
     return f"Correlation{step}: {first} below, {second} above"
 
 
-def _parameter_symbol(parameter_name: str) -> str:
+def _format_parameter_symbol(parameter_name: str) -> str:
     """Return the symbol of a parameter, with the window number if it has one."""
     plain, number = split_window_number(parameter_name)
     symbol = PARAMETERS[plain].symbol
     return f"{symbol[:-1]}^{{({number})}}$" if number else symbol
 
 
-def _draw_correlation(dataset: xr.Dataset, axes: Axes) -> None:
+def _draw_parameter_correlation_matrix(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the correlation matrix of the parameters.
 
     The lower triangle of the matrix shows the fit of the first friction law, and the upper triangle
     shows the fit of the second friction law.
     """
-    fits = [one for one, _name, _law in _iterate_fits_with_law(dataset, only_first_step=True)][:2]
+    fits = [
+        one
+        for one, _name, _law in _iterate_fits_and_law_descriptions(dataset, only_first_step=True)
+    ][:2]
     lower, upper = fits[0]["correlation"].values, fits[-1]["correlation"].values
     values = np.tril(lower) + np.triu(upper, 1)
-    names = [_parameter_symbol(str(name)) for name in dataset["parameter"].values]
+    names = [_format_parameter_symbol(str(name)) for name in dataset["parameter"].values]
     colours = colormaps["RdBu_r"].with_extremes(bad="0.85")
     image = axes.imshow(values, vmin=-1.0, vmax=1.0, cmap=colours, aspect="auto")
     axes.grid(visible=False)
-    _label_parameters(axes, names)
-    if len(names) <= _MAX_PARAMETERS_WITH_NUMBERS:
-        _write_correlations(axes, values)
+    _label_rows_and_columns_of_matrix(axes, names)
+    if len(names) <= _MAX_PARAMETERS_WITH_WRITTEN_VALUES:
+        _write_correlation_coefficients(axes, values)
     else:
         bar = cast(Figure, axes.figure).colorbar(image, ax=axes, pad=0.02)
         bar.set_label("Correlation coefficient")
 
 
-def _label_parameters(axes: Axes, names: Sequence[str]) -> None:
+def _label_rows_and_columns_of_matrix(axes: Axes, parameter_symbols: Sequence[str]) -> None:
     """Label the rows and columns of a correlation matrix without overlapping labels."""
     # A line of text is about 1.6 times as high as its letters.
     line = 1.6 * rcParams["xtick.labelsize"] / 72.0
@@ -306,18 +317,18 @@ def _label_parameters(axes: Axes, names: Sequence[str]) -> None:
         )
     )
     for axis, length in ((axes.xaxis, width), (axes.yaxis, height)):
-        some = slice(None, None, max(1, math.ceil(len(names) * line / length)))
-        axis.set_ticks(range(len(names))[some], names[some])
-    if len(names) > _MAX_PARAMETERS_WITH_NUMBERS:
+        some = slice(None, None, max(1, math.ceil(len(parameter_symbols) * line / length)))
+        axis.set_ticks(range(len(parameter_symbols))[some], parameter_symbols[some])
+    if len(parameter_symbols) > _MAX_PARAMETERS_WITH_WRITTEN_VALUES:
         axes.tick_params(axis="x", labelrotation=90.0)
     axes.tick_params(length=0)
 
 
-def _write_correlations(axes: Axes, values: np.ndarray) -> None:
+def _write_correlation_coefficients(axes: Axes, correlation_matrix: np.ndarray) -> None:
     """Write the correlation coefficients into the cells of the matrix."""
-    for (row, column), value in np.ndenumerate(values):
+    for (row, column), value in np.ndenumerate(correlation_matrix):
         shade = "white" if abs(value) > 0.6 else "black"
         text = f"{value:.2f}".replace("0.", ".") if row != column else ""
         if np.isfinite(value):
-            size = max(MIN_FONT_SIZE, min(7.0, 50.0 / len(values)))
+            size = max(MIN_FONT_SIZE, min(7.0, 50.0 / len(correlation_matrix)))
             axes.text(column, row, text, ha="center", va="center", color=shade, fontsize=size)

@@ -15,20 +15,20 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.plots._axes import (
-    add_colour_bar,
+    add_colour_bar_of_dimension,
     are_log_spaced,
     are_positive_and_span_decades,
+    compute_point_colours,
     describe_point,
     format_axis_label,
     has_numeric_points,
     is_numeric_variable,
-    point_colours,
+    list_primary_and_varying_variables,
     read_flag_meanings_of_variable,
-    set_x_axis_of_dimension,
-    varying_variables,
+    set_up_x_axis_for_dimension,
 )
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
-from rsfstudy.plots._text import to_mathtext
+from rsfstudy.plots._text import convert_symbols_to_mathtext
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Panel
 
@@ -41,7 +41,7 @@ _MAX_NAMED_IDENTICAL_CURVES = 3
 _MAX_POINTS_WITH_MARKERS = 60
 
 
-def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
+def build_panels_of_figure(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     """Build the line plots of one or several variables.
 
     Parameters
@@ -59,7 +59,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
         not contain ``variable``, or if the variable is neither numeric nor a flag.
     """
     if variable is None:
-        names = varying_variables(dataset)[:_MAX_PANELS] or ["status"]
+        names = list_primary_and_varying_variables(dataset)[:_MAX_PANELS] or ["status"]
     else:
         known = variable in dataset
         drawn = known and (
@@ -69,25 +69,27 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
         names = [variable] if drawn else []
     named = len(names) == 1 and not StoredDataset(dataset).declaration.overrides
     return [
-        _build_panel(dataset, name, dataset.attrs.get("title", "") if named else "")
+        _build_line_panel(dataset, name, dataset.attrs.get("title", "") if named else "")
         for name in names
     ]
 
 
-def _build_panel(dataset: xr.Dataset, variable_name: str, title: str) -> Panel:
+def _build_line_panel(dataset: xr.Dataset, variable_name: str, title: str) -> Panel:
     """Build the panel of one variable."""
     along = (
         _choose_x_dimension(dataset, dataset[variable_name]) if dataset[variable_name].ndim else ""
     )
     return Panel(
         x=along,
-        overlays=[partial(_draw_lines, variable_name, along)],
+        overlays=[partial(_draw_lines_of_variable, variable_name, along)],
         y_label=format_axis_label(dataset, variable_name, 200),
-        title=to_mathtext(title),
+        title=convert_symbols_to_mathtext(title),
     )
 
 
-def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes: Axes) -> None:
+def _draw_lines_of_variable(
+    variable_name: str, x_dimension: str, dataset: xr.Dataset, axes: Axes
+) -> None:
     """Draw the lines of a variable along a dimension."""
     values = dataset[variable_name]
     if told := read_flag_meanings_of_variable(values):
@@ -95,7 +97,7 @@ def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes:
         values = values.copy(data=np.reshape(places, values.shape).astype(float))
         axes.set_yticks(range(flags.size), [told[flag] for flag in flags.tolist()])
         axes.set_ylim(-0.5, flags.size - 0.5)
-    x = set_x_axis_of_dimension(axes, dataset, x_dimension) if x_dimension else np.zeros(1)
+    x = set_up_x_axis_for_dimension(axes, dataset, x_dimension) if x_dimension else np.zeros(1)
     numeric = bool(x_dimension) and has_numeric_points(dataset, x_dimension)
     coloured = _choose_colour_dimension(dataset, values, x_dimension)
     others = [str(d) for d in values.dims if d not in (x_dimension, coloured)]
@@ -112,12 +114,12 @@ def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes:
             axes.plot(x, np.atleast_1d(group.values), **style)
             _draw_standard_errors(dataset, group, x, axes, style)
             continue
-        shades = point_colours(dataset, coloured)
+        shades = compute_point_colours(dataset, coloured)
         for row, colour in zip(_iterate_values_at_points(group, [coloured]), shades, strict=True):
             axes.plot(x, row.values, **style | {"color": colour})
             style["label"] = None
     if coloured is not None:
-        add_colour_bar(dataset, axes, coloured)
+        add_colour_bar_of_dimension(dataset, axes, coloured)
     if numeric and are_log_spaced(x):
         axes.set_xscale("log")
     if are_positive_and_span_decades(np.asarray(values.values, dtype=float)):
@@ -197,12 +199,12 @@ def _find_distinct_curves(
             alike.setdefault(group.values.tobytes(), []).append(group)
     several = [d for d in dimensions if len({str(group[d].item()) for group in curves}) > 1]
     return [
-        (same[0], ", ".join(_describe_places_of_identical_curves(same, several)))
+        (same[0], ", ".join(_describe_points_of_identical_curves(same, several)))
         for same in alike.values()
     ]
 
 
-def _describe_places_of_identical_curves(
+def _describe_points_of_identical_curves(
     identical_curves: Sequence[xr.DataArray], dimensions: Sequence[str]
 ) -> tuple[str, ...]:
     """Describe the points of a group of identical curves.

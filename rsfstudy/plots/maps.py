@@ -24,17 +24,17 @@ from scipy.spatial import cKDTree
 
 from rsfstudy.plots._axes import (
     MIN_FONT_SIZE,
-    add_labelled_colour_bar,
+    add_colour_bar_of_variable,
     are_log_spaced,
     are_positive_and_span_decades,
     compute_cell_edges,
     format_axis_label,
     has_numeric_points,
     is_numeric_variable,
-    measured_variables,
+    list_measured_variables,
     read_flag_meanings_of_variable,
 )
-from rsfstudy.plots._text import format_number, to_mathtext
+from rsfstudy.plots._text import convert_symbols_to_mathtext, format_number
 from rsfstudy.status import Status
 from rsfstudy.study import Panel
 
@@ -48,11 +48,11 @@ _MIN_DISTANCE_AROUND_CONTOUR_LABEL = 0.06
 #: Minimum extent of labelled contours, as a fraction of the panel size.
 _MIN_LENGTH_OF_LABELLED_CONTOUR = 0.2
 #: If an axis has fewer points than this number, contours are not drawn.
-_MIN_POINTS_FOR_CONTOURS = 6
+_MIN_AXIS_POINTS_FOR_CONTOURS = 6
 _STATUS_LABEL_BY_CODE = {int(status): status.label for status in Status}
 
 
-def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
+def build_panels_of_figure(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     """Build the maps of a variable.
 
     Parameters
@@ -69,7 +69,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
         One map per point of the other axes, for at most 12 points. The list is empty if the dataset
         does not contain the variable, or if the variable does not have two numeric dimensions.
     """
-    names = measured_variables(dataset)[:1] if variable is None else [variable]
+    names = list_measured_variables(dataset)[:1] if variable is None else [variable]
     if not names or names[0] not in dataset:
         return []
     values = dataset[names[0]]
@@ -83,9 +83,11 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     panel = partial(
         Panel,
         x=plane[1],
-        overlays=[partial(draw_map, names[0], plane, _colour_scale(values))],
+        overlays=[
+            partial(draw_map, names[0], plane, _choose_colour_scale_and_contour_levels(values))
+        ],
         y_label=format_axis_label(dataset, plane[0], 200),
-        title=None if others else to_mathtext(dataset.attrs.get("title", "")),
+        title=None if others else convert_symbols_to_mathtext(dataset.attrs.get("title", "")),
         legend_title=format_axis_label(dataset, names[0], 60)
         if read_flag_meanings_of_variable(values)
         else None,
@@ -111,7 +113,7 @@ def _choose_map_dimensions(dataset: xr.Dataset, variable: xr.DataArray) -> tuple
 def draw_map(
     variable_name: str,
     map_dimensions: tuple[str, str],
-    colour_scale: tuple[Normalize, Sequence[float]] | None,
+    colour_scale_and_contour_levels: tuple[Normalize, Sequence[float]] | None,
     dataset: xr.Dataset,
     axes: Axes,
 ) -> None:
@@ -137,7 +139,9 @@ def draw_map(
     at = compute_cell_edges(x, are_log_spaced(x)), compute_cell_edges(y, are_log_spaced(y))
     axes.set(**{f"{w}scale": "log" for w, points in (("x", x), ("y", y)) if are_log_spaced(points)})
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
-    if found := colour_scale or _colour_scale(dataset[variable_name]):
+    if found := colour_scale_and_contour_levels or _choose_colour_scale_and_contour_levels(
+        dataset[variable_name]
+    ):
         axes.grid(False)
         known = np.ma.masked_invalid(values.values)
         # A diverging colour map is centred at zero if the values have both signs.
@@ -148,7 +152,7 @@ def draw_map(
                 colour = drawn.to_rgba(np.array(flag))
                 axes.add_collection(PolyCollection([], facecolor=colour, label=meanings[flag]))
         else:
-            add_labelled_colour_bar(drawn, dataset, axes, variable_name)
+            add_colour_bar_of_variable(drawn, dataset, axes, variable_name)
             draw_contours(axes, values, found[1])
     status = dataset["status"]
     status = status.squeeze(
@@ -161,7 +165,9 @@ def draw_map(
         )
 
 
-def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
+def _choose_colour_scale_and_contour_levels(
+    map_values: xr.DataArray,
+) -> tuple[Normalize, Sequence[float]] | None:
     """Return the colour scale and the contour levels of a variable.
 
     For a variable with flags, the function returns the flag values instead of contour levels. The
@@ -200,7 +206,7 @@ def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[flo
         Values of the variable at the contours.
     """
     y, x = (values[dimension].values for dimension in values.dims)
-    if min(values.shape) < _MIN_POINTS_FOR_CONTOURS or not len(contour_levels):
+    if min(values.shape) < _MIN_AXIS_POINTS_FOR_CONTOURS or not len(contour_levels):
         return
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels were found")
@@ -208,12 +214,17 @@ def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[flo
             x, y, values, contour_levels, colors="white", linewidths=0.6, linestyles="-"
         )
     for text in axes.clabel(
-        found, fontsize=MIN_FONT_SIZE, fmt=format_number, manual=_label_positions(axes, found)
+        found,
+        fontsize=MIN_FONT_SIZE,
+        fmt=format_number,
+        manual=_choose_contour_label_positions(axes, found),
     ):
         text.set_path_effects([withStroke(linewidth=1.0, foreground="0.2")])
 
 
-def _label_positions(axes: Axes, contour_set: QuadContourSet) -> list[tuple[float, float]]:
+def _choose_contour_label_positions(
+    axes: Axes, contour_set: QuadContourSet
+) -> list[tuple[float, float]]:
     """Choose the positions of the contour labels.
 
     The label of a contour level is placed on the longest contour of the level, at the point with
@@ -242,7 +253,7 @@ def _label_positions(axes: Axes, contour_set: QuadContourSet) -> list[tuple[floa
 def _hatch_cells_without_value_by_status(
     axes: Axes,
     cell_edges: tuple[np.ndarray, np.ndarray],
-    status: np.ndarray,
+    status_codes: np.ndarray,
     missing_mask: np.ndarray,
 ) -> None:
     """Hatch the cells without a value according to their status.
@@ -261,11 +272,11 @@ def _hatch_cells_without_value_by_status(
         True for the cells to be hatched.
     """
     for hatch, code in zip(
-        _HATCH_PATTERNS_OF_STATUSES, np.unique(status[missing_mask]), strict=False
+        _HATCH_PATTERNS_OF_STATUSES, np.unique(status_codes[missing_mask]), strict=False
     ):
         rows = [
-            _outline_of_cell_run(cell_edges, *run)
-            for run in _find_horizontal_cell_runs(missing_mask & (status == code))
+            _compute_outline_of_cell_run(cell_edges, *run)
+            for run in _find_horizontal_cell_runs(missing_mask & (status_codes == code))
         ]
         name = _STATUS_LABEL_BY_CODE[int(code)].replace("_", " ") if code else "no number"
         grey: dict[str, Any] = {"facecolor": "0.93", "edgecolor": "0.55", "linewidth": 0.0}
@@ -283,7 +294,7 @@ def _find_horizontal_cell_runs(cell_mask: np.ndarray) -> list[tuple[int, int, in
     return [(int(r), int(a), int(b)) for (r, a), (_r, b) in zip(first, last, strict=True)]
 
 
-def _outline_of_cell_run(
+def _compute_outline_of_cell_run(
     cell_edges: tuple[np.ndarray, np.ndarray], row: int, first_column: int, stop_column: int
 ) -> list[tuple[Any, Any]]:
     """Return the corners of the rectangle covered by consecutive cells."""

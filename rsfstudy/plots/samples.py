@@ -19,11 +19,11 @@ from rsfstudy.plots._axes import (
     describe_point,
     has_numeric_points,
     is_numeric_variable,
-    varying_variables,
+    list_primary_and_varying_variables,
 )
-from rsfstudy.plots._size import figure_size
+from rsfstudy.plots._size import compute_figure_size_in_inches
 from rsfstudy.plots._style import cycle_style
-from rsfstudy.plots._text import format_units, quantity_symbol, wrap_text
+from rsfstudy.plots._text import find_quantity_symbol_or_name, format_units, wrap_text
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import DrawFunction, Figure, Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
@@ -57,16 +57,18 @@ class CornerFigure(Figure):
     """
 
     @property
-    def places(self) -> list[int]:
+    def subplot_positions(self) -> list[int]:
         """Positions of the panels, counted row by row from 0."""
         return [row * self.columns + x for row in range(self.columns) for x in range(row + 1)]
 
-    def size(self) -> tuple[float, float]:
+    def compute_size_in_inches(self) -> tuple[float, float]:
         """Return the width and the height of the figure in inches."""
-        width, height = figure_size(1 if self.columns <= _MAX_COLUMNS_IN_NARROW_FIGURE else 2, 1)
+        width, height = compute_figure_size_in_inches(
+            1 if self.columns <= _MAX_COLUMNS_IN_NARROW_FIGURE else 2, 1
+        )
         return width, width if self.columns > 1 else height
 
-    def finish(self, axes_of_panels: Sequence[Axes]) -> None:
+    def align_x_axes_and_hide_inner_labels(self, axes_of_panels: Sequence[Axes]) -> None:
         """Align the x axes of each column, and remove inner labels.
 
         Parameters
@@ -74,7 +76,7 @@ class CornerFigure(Figure):
         axes_of_panels : sequence of matplotlib.axes.Axes
             Axes of the panels, in the order of ``panels``.
         """
-        for axes, place in zip(axes_of_panels, self.places, strict=True):
+        for axes, place in zip(axes_of_panels, self.subplot_positions, strict=True):
             row, column = divmod(place, self.columns)
             if row < self.columns - 1:
                 axes.set_xlabel("")
@@ -88,11 +90,13 @@ class CornerFigure(Figure):
                 axes.set_ylabel("")
                 axes.tick_params(labelleft=False)
                 axes.yaxis.get_offset_text().set_visible(False)
-            bottom = axes_of_panels[self.places.index((self.columns - 1) * self.columns + column)]
+            bottom = axes_of_panels[
+                self.subplot_positions.index((self.columns - 1) * self.columns + column)
+            ]
             axes.set_xlim(bottom.get_xlim())
 
 
-def corner_figure(dataset: xr.Dataset, variable: str | None = None) -> CornerFigure | None:
+def build_corner_figure(dataset: xr.Dataset, variable: str | None = None) -> CornerFigure | None:
     """Build the corner plot of samples or cases.
 
     Parameters
@@ -110,20 +114,20 @@ def corner_figure(dataset: xr.Dataset, variable: str | None = None) -> CornerFig
         samples or cases. The result is also None if the variable is not numeric, or does not vary
         along an axis with numbered points.
     """
-    fields = _sampled_fields(dataset)
+    fields = _list_sampled_fields_by_dimension(dataset)
     if variable is not None and variable not in dataset:
         return None
     along = next((d for d in fields if variable is None or d in dataset[variable].dims), None)
     if along is None or (variable is not None and not is_numeric_variable(dataset[variable])):
         return None
-    measured = [variable] if variable else varying_variables(dataset)[:1]
+    measured = [variable] if variable else list_primary_and_varying_variables(dataset)[:1]
     sampled = [
         name for name in fields[along] if name not in measured and has_numeric_points(dataset, name)
     ]
     # The last row shows the measured variable against each sampled field.
     names = sampled[: _MAX_SCATTERED_QUANTITIES - len(measured)] + measured
     panels = [
-        _build_panel(dataset, along, x, y)
+        _build_scatter_or_histogram_panel(dataset, along, x, y)
         for number, y in enumerate(names, start=1)
         for x in names[:number]
     ]
@@ -149,23 +153,23 @@ def posterior_figure(dataset: xr.Dataset) -> tuple[CornerFigure, xr.Dataset]:
     draws = {n: dataset["posterior"].sel(parameter=n, drop=True) for n in names}
     drawn = dataset.assign({n: draws[n].assign_attrs(dataset[n].attrs) for n in names})
     panels = [
-        _build_panel(drawn, "draw", x, y)
+        _build_scatter_or_histogram_panel(drawn, "draw", x, y)
         for number, y in enumerate(names, start=1)
         for x in names[:number]
     ]
     return CornerFigure(panels, len(names)), drawn
 
 
-def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
+def _list_sampled_fields_by_dimension(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Return the field names of each axis with numbered points, by dimension."""
     found: dict[str, list[str]] = {}
-    for axis in (stored.build() for stored in StoredDataset(dataset).declaration.axes):
+    for axis in (stored.build_axis() for stored in StoredDataset(dataset).declaration.axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
             found[axis.dimension] = [name for name in axis.fields if name in dataset.coords]
     return found
 
 
-def _build_panel(
+def _build_scatter_or_histogram_panel(
     dataset: xr.Dataset, sample_dimension: str, x_variable: str, y_variable: str
 ) -> Panel:
     """Build the panel for a pair of quantities.
@@ -178,7 +182,7 @@ def _build_panel(
         for d in dataset[name].dims
         if d != sample_dimension
     )
-    few_ticks = partial(_limit_ticks, _MAX_TICKS - x_variable.endswith("_error"))
+    few_ticks = partial(_limit_tick_count, _MAX_TICKS - x_variable.endswith("_error"))
     if x_variable == y_variable:
         marks: list[DrawFunction] = [partial(draw_histogram, x_variable, list(by)), few_ticks]
         return Panel(
@@ -211,11 +215,11 @@ def _format_short_axis_label(dataset: xr.Dataset, variable_name: str) -> str:
         variable_name.removesuffix("_error"), read_quantities_not_in_vocabulary(dataset)
     )
     units = "" if about.units in ("", "1") or about.scale else f" ({format_units(about.units)})"
-    text = wrap_text(f"{quantity_symbol(about)}{units}", _MAX_LABEL_LINE_CHARACTERS)
+    text = wrap_text(f"{find_quantity_symbol_or_name(about)}{units}", _MAX_LABEL_LINE_CHARACTERS)
     return f"error of\n{text}" if variable_name.endswith("_error") else text
 
 
-def _limit_ticks(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -> None:
+def _limit_tick_count(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -> None:
     """Limit the number of ticks so that the tick labels do not overlap.
 
     Error estimates have long tick labels, so the x axis has fewer ticks for error estimates.
@@ -225,7 +229,7 @@ def _limit_ticks(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -> Non
 
 
 def draw_histogram(
-    variable_name: str, colour_dimension: Sequence[str], dataset: xr.Dataset, axes: Axes
+    variable_name: str, colour_dimensions: Sequence[str], dataset: xr.Dataset, axes: Axes
 ) -> None:
     """Draw one histogram of a variable for each point of the other axes.
 
@@ -243,8 +247,8 @@ def draw_histogram(
     values = dataset[variable_name]
     known = values.values[np.isfinite(values.values)]
     edges = np.histogram_bin_edges(known, min(_MAX_BINS, max(5, round(known.size**0.5))))
-    for number, at in enumerate(np.ndindex(*(values.sizes[d] for d in colour_dimension))):
-        part = values.isel(dict(zip(colour_dimension, at, strict=True)))
-        text = ", ".join(describe_point(part, d) for d in colour_dimension) or None
+    for number, at in enumerate(np.ndindex(*(values.sizes[d] for d in colour_dimensions))):
+        part = values.isel(dict(zip(colour_dimensions, at, strict=True)))
+        text = ", ".join(describe_point(part, d) for d in colour_dimensions) or None
         style = {"color": cycle_style(number)["color"], "alpha": 0.5, "label": text}
         axes.hist(part.values[np.isfinite(part.values)], list(edges), **style)

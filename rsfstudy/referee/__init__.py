@@ -13,8 +13,11 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.referee.answer_comparison import AnswerComparison
-    from rsfstudy.referee.problem_files import write_problems
-    from rsfstudy.referee.verification import compare_file_with_known_answer, summarise_comparisons
+    from rsfstudy.referee.problem_files import write_shipped_problems
+    from rsfstudy.referee.verification import (
+        compare_file_with_known_answer,
+        summarise_answer_comparisons,
+    )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -28,6 +31,6 @@ else:
 __all__ = [
     "AnswerComparison",
     "compare_file_with_known_answer",
-    "summarise_comparisons",
-    "write_problems",
+    "summarise_answer_comparisons",
+    "write_shipped_problems",
 ]

@@ -36,7 +36,7 @@ _MAX_DIFFERENCE_IN_LAST_PLACE_UNITS = 1.51
 #: by the largest known value of the quantity.
 _QUANTITIES_STARTING_AT_ZERO = ("slip", "pore_pressure")
 #: Conventions for radiation damping, and the factors by which eta is multiplied.
-_RADIATION_DAMPING_CONVENTIONS = {
+_DAMPING_FACTOR_BY_CONVENTION = {
     "twice as large (G/c_s instead of G/(2 c_s))": 2.0,
     "half as large": 0.5,
     "left out": 0.0,
@@ -84,7 +84,7 @@ class QuantityAgreement:
     agreeing_digits: float
     least_agreeing_row: int
     first_failing_row: int | None
-    agrees_to_written_digits: bool
+    agrees_within_rounding_error: bool
     relative_differences: np.ndarray
 
 
@@ -138,31 +138,31 @@ class AnswerComparison:
                 f"  {agreement.quantity_name:20s} "
                 f"{round_digits_down(agreement.agreeing_digits):4.1f} digits"
             )
-            if agreement.agrees_to_written_digits:
+            if agreement.agrees_within_rounding_error:
                 text += ", all written decimal places"
             elif agreement.agreeing_digits == problem.digits:
                 text += ", all known digits"
-            elif problem.index_column:
+            elif problem.index_column_name:
                 text += (
                     ", lowest agreement at "
-                    f"{_format_answer_row(problem, agreement.least_agreeing_row)}"
+                    f"{_format_index_value_of_row(problem, agreement.least_agreeing_row)}"
                 )
-            if agreement.first_failing_row is not None and problem.index_column:
+            if agreement.first_failing_row is not None and problem.index_column_name:
                 text += (
                     "; fewer digits than required from "
-                    f"{_format_answer_row(problem, agreement.first_failing_row)}"
+                    f"{_format_index_value_of_row(problem, agreement.first_failing_row)}"
                 )
             lines.append(text)
         return lines
 
 
-def _format_answer_row(problem: BenchmarkProblem, row: int) -> str:
+def _format_index_value_of_row(problem: BenchmarkProblem, row: int) -> str:
     """Format the value in the index column of a row, with units."""
-    units = {"time": " s"}.get(problem.index_column, "")
-    return f"{problem.index_column} = {problem.index_values[row]:g}{units}"
+    units = {"time": " s"}.get(problem.index_column_name, "")
+    return f"{problem.index_column_name} = {problem.index_values[row]:g}{units}"
 
 
-def known_answer(
+def read_or_compute_known_answer(
     problem: BenchmarkProblem, answer_path: Path | None
 ) -> tuple[BenchmarkProblem, AnswerColumnByQuantity]:
     """Return a problem and its known answer.
@@ -198,14 +198,14 @@ def known_answer(
         )
         for tolerance in _REFERENCE_RTOLS
     )
-    both = [a.agreeing_digits for a in _compute_quantity_agreements(problem, rough, fine, 0.0)]
+    both = [a.agreeing_digits for a in _compare_quantities(problem, rough, fine, 0.0)]
     return replace(problem, digits=max(1, math.floor(min(both)))), fine
 
 
 def compare_answers(
     problem: BenchmarkProblem,
-    answer: AnswerColumnByQuantity,
-    reported: Mapping[str, ReportedQuantity],
+    known_answer: AnswerColumnByQuantity,
+    reported_quantities: Mapping[str, ReportedQuantity],
     required_digits: float,
 ) -> AnswerComparison:
     r"""Compare the answer of another code with the known answer.
@@ -243,17 +243,17 @@ def compare_answers(
     :math:`-\log_{10} \max \Delta`. The number of correct digits cannot exceed the number of digits
     of the known answer.
     """
-    values = {name: column.values for name, column in reported.items()}
-    places = {name: column.last_place_unit for name, column in reported.items()}
+    values = {name: column.si_values for name, column in reported_quantities.items()}
+    places = {name: column.last_place_unit_in_si for name, column in reported_quantities.items()}
     found = AnswerComparison(
         problem,
-        _compute_quantity_agreements(problem, values, answer, required_digits, places),
+        _compare_quantities(problem, values, known_answer, required_digits, places),
         required_digits,
     )
     if found.has_required_digits:
         return found
     best, words = max(
-        _iterate_explanations_of_disagreement(problem, values, answer), default=(0.0, "")
+        _iterate_explanations_of_disagreement(problem, values, known_answer), default=(0.0, "")
     )
     better = best >= max(_MIN_EXPLAINED_DIGITS, found.agreeing_digits + _MIN_DIGITS_GAINED)
     explanation = (
@@ -281,19 +281,21 @@ def round_digits_down(digits: float) -> float:
     return math.floor(10.0 * digits) / 10.0
 
 
-def _compute_quantity_agreements(
+def _compare_quantities(
     problem: BenchmarkProblem,
-    reported: AnswerColumnByQuantity,
-    answer: AnswerColumnByQuantity,
+    reported_answer: AnswerColumnByQuantity,
+    known_answer: AnswerColumnByQuantity,
     required_digits: float,
-    last_place_units: Mapping[str, float] | None = None,
+    last_place_unit_by_quantity: Mapping[str, float] | None = None,
 ) -> tuple[QuantityAgreement, ...]:
     """Compute the agreement of each quantity of a problem."""
     found = []
     for name in problem.quantities:
-        apart = _relative_differences(name, reported[name], answer[name], problem.digits)
+        apart = _compute_relative_differences(
+            name, reported_answer[name], known_answer[name], problem.digits
+        )
         few = np.flatnonzero(apart > 10.0**-required_digits)
-        place = (last_place_units or {}).get(name, 0.0)
+        place = (last_place_unit_by_quantity or {}).get(name, 0.0)
         found.append(
             QuantityAgreement(
                 name,
@@ -302,7 +304,7 @@ def _compute_quantity_agreements(
                 int(few[0]) if len(few) else None,
                 bool(
                     (
-                        np.abs(reported[name] - answer[name])
+                        np.abs(reported_answer[name] - known_answer[name])
                         <= _MAX_DIFFERENCE_IN_LAST_PLACE_UNITS * place
                     ).all()
                 ),
@@ -312,8 +314,8 @@ def _compute_quantity_agreements(
     return tuple(found)
 
 
-def _relative_differences(
-    quantity_name: str, reported: np.ndarray, reference: np.ndarray, known_digits: int
+def _compute_relative_differences(
+    quantity_name: str, reported_values: np.ndarray, known_values: np.ndarray, known_digits: int
 ) -> np.ndarray:
     """Compute the relative differences of a quantity from the known answer.
 
@@ -321,29 +323,31 @@ def _relative_differences(
     from each absolute difference. The remaining difference is divided by the known value. For
     quantities that start at zero, the remaining difference is divided by the largest known value.
     """
-    size = np.abs(reference)
+    size = np.abs(known_values)
     rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - known_digits)
     scale = (
-        np.full(len(reference), size.max() or 1.0)
+        np.full(len(known_values), size.max() or 1.0)
         if quantity_name in _QUANTITIES_STARTING_AT_ZERO
         else size
     )
-    return np.asarray(np.maximum(np.abs(reported - reference) - rounded, 0.0) / scale)
+    return np.asarray(np.maximum(np.abs(reported_values - known_values) - rounded, 0.0) / scale)
 
 
 def _iterate_explanations_of_disagreement(
-    problem: BenchmarkProblem, reported: AnswerColumnByQuantity, answer: AnswerColumnByQuantity
+    problem: BenchmarkProblem,
+    reported_answer: AnswerColumnByQuantity,
+    known_answer: AnswerColumnByQuantity,
 ) -> Iterator[tuple[float, str]]:
     """Iterate over conventions that may explain an incorrect answer.
 
     Each item contains the number of correct digits under a convention, and a description of the
     convention.
     """
-    for words, table in _iterate_answers_in_other_conventions(problem, reported, answer):
+    for words, table in _iterate_answers_in_other_conventions(
+        problem, reported_answer, known_answer
+    ):
         yield (
-            min(
-                a.agreeing_digits for a in _compute_quantity_agreements(problem, table, answer, 0.0)
-            ),
+            min(a.agreeing_digits for a in _compare_quantities(problem, table, known_answer, 0.0)),
             words,
         )
     for words, other in _iterate_problems_in_other_conventions(problem):
@@ -355,50 +359,56 @@ def _iterate_explanations_of_disagreement(
             continue
         yield (
             min(
-                a.agreeing_digits
-                for a in _compute_quantity_agreements(problem, reported, table, 0.0)
+                a.agreeing_digits for a in _compare_quantities(problem, reported_answer, table, 0.0)
             ),
             words,
         )
 
 
 def _iterate_answers_in_other_conventions(
-    problem: BenchmarkProblem, reported: AnswerColumnByQuantity, answer: AnswerColumnByQuantity
+    problem: BenchmarkProblem,
+    reported_answer: AnswerColumnByQuantity,
+    known_answer: AnswerColumnByQuantity,
 ) -> Iterator[tuple[str, AnswerColumnByQuantity]]:
     """Iterate over copies of an answer, converted from other conventions.
 
     Each item contains a description of a convention, and the columns of the converted answer.
     """
-    shift, stress = sum(problem.b) * math.log(2.0), problem.rig.normal_stress
-    if "friction" in reported:
+    shift, stress = sum(problem.b_values) * math.log(2.0), problem.rig.normal_stress
+    if "friction" in reported_answer:
         for sign, place in ((1.0, "omitted from"), (-1.0, "included in")):
-            moved = reported["friction"] + sign * shift
+            moved = reported_answer["friction"] + sign * shift
             words = f"friction is shifted by b ln 2, as if 2 D_c were {place} the logarithm"
-            yield words, reported | {"friction": moved}
-        if problem.radiation_damping and "slip_rate" in reported:
+            yield words, reported_answer | {"friction": moved}
+        if problem.radiation_damping and "slip_rate" in reported_answer:
             at_fault = (
-                reported["friction"] - problem.radiation_damping * reported["slip_rate"] / stress
+                reported_answer["friction"]
+                - problem.radiation_damping * reported_answer["slip_rate"] / stress
             )
             words = "friction is computed from the spring stress, which includes eta V/sigma"
-            yield words, reported | {"friction": at_fault}
+            yield words, reported_answer | {"friction": at_fault}
     for name in problem.quantities:
-        factor = float(np.median(reported[name] / np.where(answer[name], answer[name], np.nan)))
+        factor = float(
+            np.median(
+                reported_answer[name] / np.where(known_answer[name], known_answer[name], np.nan)
+            )
+        )
         # An arbitrary factor or an arbitrary offset would explain any single value.
-        several = len(answer[name]) > 1
+        several = len(known_answer[name]) > 1
         usual = _find_common_conversion_factor(
             factor, _FACTOR_RTOL if several else _SINGLE_VALUE_FACTOR_RTOL
         )
         if usual is not None:
-            yield f"{name} {usual[0]}", reported | {name: reported[name] / usual[1]}
+            yield f"{name} {usual[0]}", reported_answer | {name: reported_answer[name] / usual[1]}
         elif several and math.isfinite(factor) and factor:
-            words = f"{name} is {_format_factor(factor)} times the reference value"
-            yield words, reported | {name: reported[name] / factor}
+            words = f"{name} is {_format_conversion_factor(factor)} times the reference value"
+            yield words, reported_answer | {name: reported_answer[name] / factor}
         if several:
-            apart = float(np.median(reported[name] - answer[name]))
+            apart = float(np.median(reported_answer[name] - known_answer[name]))
             words = f"{name} is shifted by {apart:.6g} {problem.quantity_units[name]}".removesuffix(
                 " 1"
             )
-            yield words, reported | {name: reported[name] - apart}
+            yield words, reported_answer | {name: reported_answer[name] - apart}
 
 
 def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
@@ -422,7 +432,7 @@ def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str
     return None
 
 
-def _format_factor(factor: float) -> str:
+def _format_conversion_factor(factor: float) -> str:
     """Format a factor so that a value close to 1 is not rounded to 1."""
     text, beyond = f"{factor:.6g}", factor - 1.0
     return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
@@ -441,14 +451,14 @@ def _iterate_problems_in_other_conventions(
         return replace(problem, parameters={**problem.parameters, **parameters})
 
     if problem.radiation_damping:
-        for words, factor in _RADIATION_DAMPING_CONVENTIONS.items():
+        for words, factor in _DAMPING_FACTOR_BY_CONVENTION.items():
             eta = f"{factor * problem.radiation_damping!r} Pa s/m"
             yield f"damping is {words}", changed(radiation_damping=eta)
     if problem.initial:
-        steady = [f"{theta!r} s" for theta in problem.theta_star]
+        steady = [f"{theta!r} s" for theta in problem.steady_thetas_at_reference_velocity]
         rate = problem.initial["slip_rate"]
         factor = math.exp(-problem.initial_log_slip_rate)
-        at_rate = [f"{factor * theta!r} s" for theta in problem.theta_star]
+        at_rate = [f"{factor * theta!r} s" for theta in problem.steady_thetas_at_reference_velocity]
         for words, thetas in (("D_c/V_*", steady), (f"D_c/V(0) with V(0) = {rate}", at_rate)):
             other = {**problem.initial, "theta": thetas}
             yield f"theta_0 is {words} instead of the given value", replace(problem, initial=other)

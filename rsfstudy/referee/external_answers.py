@@ -45,8 +45,8 @@ class ReportedQuantity(NamedTuple):
         values are zero, or if the quantity was computed from another quantity.
     """
 
-    values: np.ndarray
-    last_place_unit: float
+    si_values: np.ndarray
+    last_place_unit_in_si: float
 
 
 def read_external_answer(
@@ -86,12 +86,12 @@ def read_external_answer(
     )
     if count != len(rows):
         remedy = (
-            f"Write one row for each {problem.index_column} of the problem. Rows are not "
+            f"Write one row for each {problem.index_column_name} of the problem. Rows are not "
             "interpolated."
         )
         rule = f"must be {len(rows)}"
         wrong = InvalidValue(
-            "number of rows", count, rule, remedy=remedy if problem.index_column else ""
+            "number of rows", count, rule, remedy=remedy if problem.index_column_name else ""
         )
         raise wrong.with_location(str(path))
     asked = {*problem.column_names, *_UNITS_BY_SUBSTITUTE_QUANTITY}
@@ -115,9 +115,12 @@ def read_external_answer(
             )
             wrong = InvalidValue("column", name, "is missing", choices=table, remedy=remedy)
             raise wrong.with_location(str(path))
-    if problem.index_column:
+    if problem.index_column_name:
         _check_index_values(
-            table[problem.index_column], found[problem.index_column].values, rows, problem
+            table[problem.index_column_name],
+            found[problem.index_column_name].si_values,
+            rows,
+            problem,
         )
     return {name: found[name] for name in problem.column_names}
 
@@ -133,15 +136,15 @@ def _derive_quantity_from_substitute(
     the shear stress :math:`\tau` of the spring as :math:`\mu = (\tau - \eta V)/\sigma`.
     """
     if quantity_name == "slip_rate":
-        return np.asarray(10.0 ** reported_quantities["log10_slip_rate"].values)
+        return np.asarray(10.0 ** reported_quantities["log10_slip_rate"].si_values)
     radiated = (
-        problem.radiation_damping * reported_quantities["slip_rate"].values
+        problem.radiation_damping * reported_quantities["slip_rate"].si_values
         if problem.radiation_damping
         else 0.0
     )
     return np.asarray(
-        (reported_quantities["shear_stress"].values - radiated)
-        / reference_answers.compute_normal_stress(problem)
+        (reported_quantities["shear_stress"].si_values - radiated)
+        / reference_answers.compute_effective_normal_stress_series(problem)
     )
 
 
@@ -170,7 +173,7 @@ def _convert_column_to_si(
         if quantity_name == "log10_slip_rate"
         else _MAX_ACCEPTED_ANSWER_VALUE_IN_SI / factor
     )
-    column.check_values(
+    column.raise_for_invalid_values(
         quantity_name, ~(np.abs(column.values) <= most), f"must be a number of at most {most:g}"
     )
     return ReportedQuantity(column.values * factor, factor * _find_last_place_unit(column.values))
@@ -199,7 +202,9 @@ def _check_index_values(
         np.abs(values - expected_values)
         > _RTOL_FOR_MATCHING_ANSWER_TIMES * np.abs(expected_values).max()
     )
-    wanted = f"{expected_values[np.argmax(wrong)]:g} {problem.quantity_units[problem.index_column]}"
-    column._replace(values=values).check_values(
-        problem.index_column, wrong, f"must be {wanted}, because rows are not interpolated"
+    wanted = (
+        f"{expected_values[np.argmax(wrong)]:g} {problem.quantity_units[problem.index_column_name]}"
+    )
+    column._replace(values=values).raise_for_invalid_values(
+        problem.index_column_name, wrong, f"must be {wanted}, because rows are not interpolated"
     )

@@ -27,27 +27,27 @@ from rsfstudy.error_boundary import check_regular_file, format_exception
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
 from rsfstudy.motion import Event, EventKind, Integrator, MotionStopped
 from rsfstudy.parts import Segment
-from rsfstudy.path_checks import check_path
+from rsfstudy.path_checks import check_path_is_valid
 from rsfstudy.rig import Rig, convert_to_si
 from rsfstudy.slider import Scene, SceneFields
 
 #: Folder of the shipped problems and their answers.
 SHIPPED_PROBLEM_FOLDER = Path(__file__).with_name("problems")
 #: SI units of the quantities that a problem can request, for each type of answer.
-UNITS_OF_SERIES_QUANTITIES = {
+SI_UNITS_BY_SERIES_QUANTITY = {
     "time": "s", "friction": "1", "slip_rate": "m/s", "theta": "s", "theta_1": "s", "theta_2": "s",
     "slip": "m", "normal_stress": "Pa", "pore_pressure": "Pa",
 }  # fmt: skip
-UNITS_OF_PEAK_QUANTITIES = {"event": "1", "time": "s", "slip_rate": "m/s"}
+SI_UNITS_BY_PEAK_QUANTITY = {"event": "1", "time": "s", "slip_rate": "m/s"}
 SI_UNITS_BY_SCALAR_QUANTITY = {
     "critical_stiffness": "Pa/m", "growth_rate": "1/s", "angular_frequency": "1/s",
     "critical_velocity": "m/s", "critical_displacement": "m", "recurrence_interval": "s",
     "static_stress_drop": "Pa", "dynamic_stress_drop": "Pa", "peak_slip_rate": "m/s",
     "slowest_slip_rate": "m/s",
 }  # fmt: skip
-QUANTITY_UNITS_BY_REPORT_KIND = {
-    "series": UNITS_OF_SERIES_QUANTITIES,
-    "peaks": UNITS_OF_PEAK_QUANTITIES,
+SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND = {
+    "series": SI_UNITS_BY_SERIES_QUANTITY,
+    "peaks": SI_UNITS_BY_PEAK_QUANTITY,
     "numbers": SI_UNITS_BY_SCALAR_QUANTITY,
 }
 #: Rig fields, keyed by the names of problem parameters. The first dictionary contains only the
@@ -64,7 +64,7 @@ _RIG_FIELD_BY_PARAMETER = {
     "mass": "mass",
 }
 #: SI units of the parameters that are converted to dimensionless fields of the scene.
-_UNITS_BY_PARAMETER = {
+_SI_UNITS_BY_PARAMETER = {
     "b": "1", "b_2": "1", "D_c_2": "m", "radiation_damping": "Pa s/m", "V_c": "m/s",
     "V_unstable": "m/s",
 }  # fmt: skip
@@ -78,7 +78,7 @@ _NAMES_OF_LAWS_WITH_THETA_AS_STATE = (
 
 #: The pattern matches error messages of msgspec about wrong types. The dictionary contains
 #: descriptions of types for error messages of rsfstudy.
-_TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
+_MSGSPEC_TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
 _READABLE_NAME_BY_TYPE_NAME = {
     "array": "a list", "object": "a table", "str": "a string", "int": "a whole number",
     "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
@@ -148,9 +148,9 @@ class BenchmarkProblem:
 
     def __post_init__(self) -> None:
         """Validate the fields of the problem."""
-        if self.report not in QUANTITY_UNITS_BY_REPORT_KIND:
+        if self.report not in SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND:
             raise InvalidValue(
-                "report", self.report, "is unknown", choices=QUANTITY_UNITS_BY_REPORT_KIND
+                "report", self.report, "is unknown", choices=SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND
             )
         if not self.quantities:
             rule = "must list at least one quantity"
@@ -192,10 +192,10 @@ class BenchmarkProblem:
     @property
     def quantity_units(self) -> Mapping[str, str]:
         """SI units of the quantities that can be requested, by name."""
-        return QUANTITY_UNITS_BY_REPORT_KIND[self.report]
+        return SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND[self.report]
 
     @property
-    def index_column(self) -> str:
+    def index_column_name(self) -> str:
         """Name of the column that identifies the rows of the answer.
 
         The name is empty if the answer consists of a single row.
@@ -206,7 +206,9 @@ class BenchmarkProblem:
     def column_names(self) -> tuple[str, ...]:
         """Names of the columns of the answer."""
         return (
-            (self.index_column, *self.quantities) if self.index_column else tuple(self.quantities)
+            (self.index_column_name, *self.quantities)
+            if self.index_column_name
+            else tuple(self.quantities)
         )
 
     @property
@@ -240,12 +242,12 @@ class BenchmarkProblem:
         stated = self.parameters
         return {
             n: convert_to_si(n, stated[n], units)
-            for n, units in _UNITS_BY_PARAMETER.items()
+            for n, units in _SI_UNITS_BY_PARAMETER.items()
             if n in stated
         }
 
     @property
-    def b(self) -> tuple[float, ...]:
+    def b_values(self) -> tuple[float, ...]:
         """Evolution effects b, one value per state variable."""
         return tuple(
             self.si_parameters[name] for name in ("b", "b_2") if name in self.si_parameters
@@ -270,13 +272,13 @@ class BenchmarkProblem:
         fields = {
             n: v
             for n, v in self.parameters.items()
-            if n not in {*_RIG_FIELD_BY_PARAMETER, *_UNITS_BY_PARAMETER}
+            if n not in {*_RIG_FIELD_BY_PARAMETER, *_SI_UNITS_BY_PARAMETER}
         }
         fields |= {"law": self.law, "a": a}
-        if len(self.b) == 1:
-            fields["b_over_a"] = self.b[0] / a
+        if len(self.b_values) == 1:
+            fields["b_over_a"] = self.b_values[0] / a
         else:
-            fields |= {f"b{i}_over_a": b / a for i, b in enumerate(self.b, start=1)}
+            fields |= {f"b{i}_over_a": b / a for i, b in enumerate(self.b_values, start=1)}
             fields["length_ratio"] = si["D_c_2"] / rig.slip_distance
         if "phi" in fields:
             fields["normal_stress"] = "variable"
@@ -285,7 +287,7 @@ class BenchmarkProblem:
         if "V_c" in si:
             fields["cutoff_velocity_ratio"] = si["V_c"] / rig.reference_velocity
         if "V_unstable" in si:
-            period = rig.period or SceneFields.defaults()["period"]
+            period = rig.period or SceneFields.collect_defaults()["period"]
             norm = si["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
             fields["instability_norm"] = norm
         if self.loading:
@@ -293,7 +295,7 @@ class BenchmarkProblem:
         return rig.scene(**fields)
 
     @property
-    def theta_star(self) -> tuple[float, ...]:
+    def steady_thetas_at_reference_velocity(self) -> tuple[float, ...]:
         r"""Steady-state values of theta at the reference velocity.
 
         The tuple contains one value of :math:`\theta_*` in s per state variable.
@@ -320,7 +322,7 @@ class BenchmarkProblem:
         if self.law == "composite":
             scale = math.exp(lambertw(math.exp(-velocity / self.si_parameters["V_c"])).real)
         lengths = self.rig.slip_distance, self.si_parameters.get("D_c_2", math.nan)
-        return tuple(scale * length / velocity for length in lengths[: len(self.b)])
+        return tuple(scale * length / velocity for length in lengths[: len(self.b_values)])
 
     @cached_property
     def initial_log_slip_rate(self) -> float:
@@ -329,7 +331,7 @@ class BenchmarkProblem:
         return math.log(rate / self.rig.reference_velocity)
 
     @property
-    def initial_event(self) -> Event | None:
+    def initial_state_event(self) -> Event | None:
         """Initial state of the motion, computed from the initial slip rate and theta.
 
         The stress of the spring is chosen so that the slip rate before the first step of the
@@ -337,7 +339,11 @@ class BenchmarkProblem:
         """
         if not self.initial:
             return None
-        scene, x, states = self.scene, self.initial_log_slip_rate, self._initial_state_variables()
+        scene, x, states = (
+            self.scene,
+            self.initial_log_slip_rate,
+            self._compute_initial_state_variables(),
+        )
         acting, before = scene.continuous_segments[0][0], scene.with_segment(Segment(1.0))
         friction = scene.a * x + sum(states)
         if scene.parts.law.regularised:
@@ -354,7 +360,7 @@ class BenchmarkProblem:
         point = Integrator.point_with_slip_rate(acting, point, x) if scene.has_mass else point
         return Event(EventKind.START, None, 0.0, 0.0, point, "", 0, 0.0)
 
-    def _initial_state_variables(self) -> tuple[float, ...]:
+    def _compute_initial_state_variables(self) -> tuple[float, ...]:
         r"""Compute the initial values of the state variables.
 
         The state variable is :math:`b \ln(\theta/\theta_*)`, which is zero in steady sliding at
@@ -362,10 +368,10 @@ class BenchmarkProblem:
         """
         stated = self.initial["theta"]
         thetas = stated if isinstance(stated, list) else [stated]
-        if len(thetas) != len(self.b):
-            rule = f"must contain {len(self.b)} values, one for each b"
+        if len(thetas) != len(self.b_values):
+            rule = f"must contain {len(self.b_values)} values, one for each b"
             raise InvalidValue("theta", stated, rule)
-        known = zip(self.b, thetas, self.theta_star, strict=True)
+        known = zip(self.b_values, thetas, self.steady_thetas_at_reference_velocity, strict=True)
         return tuple(
             b * math.log(_parse_positive_si_value("theta", x, "s") / star) for b, x, star in known
         )
@@ -421,7 +427,7 @@ def read_problem(path: Path) -> BenchmarkProblem:
                 raise InvalidValue("problem", [*stated], f"must contain {name}")
         number = int(path.name[:2]) if path.parent == SHIPPED_PROBLEM_FOLDER else 0
         problem = BenchmarkProblem(**stated, number=number)
-        _ = problem.scene, problem.initial_event
+        _ = problem.scene, problem.initial_state_event
         return problem
     except InvalidValue as error:
         raise error.with_location(str(path)) from error
@@ -449,7 +455,7 @@ def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
     try:
         msgspec.convert(value, expected_type)
     except msgspec.ValidationError as error:
-        found = _TYPE_ERROR_PATTERN.search(str(error))
+        found = _MSGSPEC_TYPE_ERROR_PATTERN.search(str(error))
         if found is None:
             raise InvalidValue(name, value, f"is invalid: {error}") from error
         wanted, actual = (
@@ -459,7 +465,7 @@ def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
         raise InvalidValue(place, value, f"must be {wanted}, not {actual}") from error
 
 
-def shipped_problem_files() -> dict[int, Path]:
+def find_shipped_problem_files() -> dict[int, Path]:
     """Return the files of the shipped problems, keyed by problem number.
 
     Returns
@@ -470,7 +476,7 @@ def shipped_problem_files() -> dict[int, Path]:
     return {int(path.name[:2]): path for path in sorted(SHIPPED_PROBLEM_FOLDER.glob("*.toml"))}
 
 
-def write_problems(directory: Path) -> int:
+def write_shipped_problems(directory: Path) -> int:
     """Write the shipped problems, their answers and templates to a directory.
 
     The function creates the folders ``problems``, ``answers`` and ``templates``, and the script
@@ -493,11 +499,11 @@ def write_problems(directory: Path) -> int:
     DataError
         If the files cannot be written.
     """
-    check_path("DIR", directory)
+    check_path_is_valid("DIR", directory)
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         remedy = "Choose a new directory, because existing files are not replaced."
         raise InvalidValue("DIR", str(directory), "already exists", remedy=remedy)
-    shipped = shipped_problem_files()
+    shipped = find_shipped_problem_files()
     try:
         places = {name: directory / name for name in ("problems", "answers", "templates")}
         for place in places.values():
@@ -516,7 +522,7 @@ def write_problems(directory: Path) -> int:
 def _write_answer_template(problem: BenchmarkProblem, path: Path) -> None:
     """Write a table with the headings and the index column of an answer."""
     empty = [""] * len(problem.quantities)
-    rows = [f"{row:.12g}" for row in problem.index_values] if problem.index_column else []
+    rows = [f"{row:.12g}" for row in problem.index_values] if problem.index_column_name else []
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(problem.column_headings)

@@ -52,7 +52,7 @@ def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColum
     return {name: told[name] for name in problem.column_names}
 
 
-def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
+def compute_effective_normal_stress_series(problem: BenchmarkProblem) -> np.ndarray:
     """Compute the effective normal stress at the times of a time series.
 
     Parameters
@@ -84,17 +84,17 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
         scene,
         recording=recording,
         until=float(at[-1]),
-        resume_from=problem.initial_event,
+        resume_from=problem.initial_state_event,
     )
     for _ in moving:
         pass
     seen = recording.as_table(scene)
-    told = dict(zip(Recording.MOTION_VARIABLES, seen.T, strict=False))
-    sigma, b = rig.normal_stress, np.array(problem.b)
+    told = dict(zip(Recording.MOTION_VARIABLE_NAMES, seen.T, strict=False))
+    sigma, b = rig.normal_stress, np.array(problem.b_values)
     states = seen[:, Recording.FIRST_STATE_COLUMN : Recording.FIRST_STATE_COLUMN + len(b)]
     taken = states.sum(axis=1) - told["state_variable"]
     states = states - np.outer(taken, np.abs(b) / np.abs(b).sum())
-    thetas = (np.array(problem.theta_star) * np.exp(states / b)).T
+    thetas = (np.array(problem.steady_thetas_at_reference_velocity) * np.exp(states / b)).T
     return {
         "time": np.array(problem.times),
         "friction": told["frictional_stress"] / told["normal_stress_ratio"],
@@ -117,7 +117,7 @@ def _compute_times_and_rates_of_peaks(
         problem.scene,
         [maximum("log_slip_rate")],
         with_time=True,
-        resume_from=problem.initial_event,
+        resume_from=problem.initial_state_event,
     )
     peaks = list(islice((e for e in watched if e.kind is EventKind.MAXIMUM), problem.count))
     return {
@@ -138,7 +138,7 @@ def _compute_requested_scalar_quantities(
     return {name: np.array([value]) for name, value in told.items()}
 
 
-def _run_measure_of_problem(
+def _apply_measure_to_problem(
     problem: BenchmarkProblem, accuracy: Accuracy, measure: Measure
 ) -> Mapping[str, float]:
     """Apply a measure to the scene of a problem.
@@ -154,7 +154,9 @@ def _run_measure_of_problem(
     return found.values
 
 
-def _compute_stability_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
+def _compute_linear_stability_quantities(
+    problem: BenchmarkProblem, accuracy: Accuracy
+) -> tuple[float, ...]:
     """Compute the critical stiffness, the growth rate and the frequency."""
     scene, rig = problem.scene, problem.rig
     growth = scene.linear_growth_rates(scene.log_load_velocity)[0] * scene.load_velocity
@@ -165,21 +167,21 @@ def _compute_stability_numbers(problem: BenchmarkProblem, accuracy: Accuracy) ->
 
 def _compute_critical_velocity(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
     """Compute the critical load point velocity in m/s."""
-    found = _run_measure_of_problem(problem, accuracy, CriticalStep())
+    found = _apply_measure_to_problem(problem, accuracy, CriticalStep())
     return (problem.rig.reference_velocity * found["critical_velocity_ratio"],)
 
 
 def _compute_critical_displacement(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
     """Compute the critical displacement step in m."""
-    found = _run_measure_of_problem(problem, accuracy, CriticalStep(of="displacement_step"))
+    found = _apply_measure_to_problem(problem, accuracy, CriticalStep(of="displacement_step"))
     return (problem.rig.slip_distance * found["critical_displacement"],)
 
 
-def _compute_limit_cycle_numbers(
+def _compute_limit_cycle_quantities(
     problem: BenchmarkProblem, accuracy: Accuracy
 ) -> tuple[float, ...]:
     """Compute the recurrence interval, stress drops and slip rates."""
-    rig, found = problem.rig, _run_measure_of_problem(problem, accuracy, LimitCycle(phases=2))
+    rig, found = problem.rig, _apply_measure_to_problem(problem, accuracy, LimitCycle(phases=2))
     drops = (rig.normal_stress * found[f"{name}_stress_drop"] for name in ("static", "dynamic"))
     rates = (rig.reference_velocity * 10.0 ** found[f"{m}_log10_slip_rate"] for m in ("max", "min"))
     return found["recurrence_interval"] / rig.dimensionless("1 s"), *drops, *rates
@@ -188,7 +190,11 @@ def _compute_limit_cycle_numbers(
 _COMPUTE_FUNCTION_BY_SCALAR_QUANTITIES: Mapping[
     tuple[str, ...], Callable[[BenchmarkProblem, Accuracy], tuple[float, ...]]
 ] = {
-    ("critical_stiffness", "growth_rate", "angular_frequency"): _compute_stability_numbers,
+    (
+        "critical_stiffness",
+        "growth_rate",
+        "angular_frequency",
+    ): _compute_linear_stability_quantities,
     ("critical_velocity",): _compute_critical_velocity,
     ("critical_displacement",): _compute_critical_displacement,
     (
@@ -197,5 +203,5 @@ _COMPUTE_FUNCTION_BY_SCALAR_QUANTITIES: Mapping[
         "dynamic_stress_drop",
         "peak_slip_rate",
         "slowest_slip_rate",
-    ): _compute_limit_cycle_numbers,
+    ): _compute_limit_cycle_quantities,
 }

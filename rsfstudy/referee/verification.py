@@ -7,14 +7,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import pluralize
-from rsfstudy.referee.answer_comparison import AnswerComparison, compare_answers, known_answer
+from rsfstudy.formatting import format_count_with_noun
+from rsfstudy.referee.answer_comparison import (
+    AnswerComparison,
+    compare_answers,
+    read_or_compute_known_answer,
+)
 from rsfstudy.referee.external_answers import read_external_answer
-from rsfstudy.referee.problem_files import read_problem, shipped_problem_files
+from rsfstudy.referee.problem_files import find_shipped_problem_files, read_problem
 
 
 def compare_file_with_known_answer(
-    file: Path, stated_problem: str, columns: Mapping[str, str] | None, required_digits: float
+    file: Path,
+    problem_number_or_path: str,
+    column_by_quantity: Mapping[str, str] | None,
+    required_digits: float,
 ) -> AnswerComparison:
     """Compare the output file of another code with a known answer.
 
@@ -43,8 +50,12 @@ def compare_file_with_known_answer(
     DataError
         If a file cannot be read.
     """
-    number, there, path = stated_problem or file.name[:2], shipped_problem_files(), None
-    if stated_problem and not number.isdecimal():
+    number, there, path = (
+        problem_number_or_path or file.name[:2],
+        find_shipped_problem_files(),
+        None,
+    )
+    if problem_number_or_path and not number.isdecimal():
         posed = read_problem(Path(number))
     elif number.isdecimal() and int(number) in there:
         posed = read_problem(there[int(number)])
@@ -60,11 +71,11 @@ def compare_file_with_known_answer(
             choices=map(str, there),
             remedy=remedy,
         )
-    told = read_external_answer(file, posed, columns)
-    return compare_answers(*known_answer(posed, path), told, required_digits)
+    told = read_external_answer(file, posed, column_by_quantity)
+    return compare_answers(*read_or_compute_known_answer(posed, path), told, required_digits)
 
 
-def summarise_comparisons(comparisons: Sequence[AnswerComparison]) -> str:
+def summarise_answer_comparisons(answer_comparisons: Sequence[AnswerComparison]) -> str:
     """Summarise the comparisons of several files in one line.
 
     Parameters
@@ -79,12 +90,14 @@ def summarise_comparisons(comparisons: Sequence[AnswerComparison]) -> str:
     """
     passed = {
         one.problem.title: math.floor(one.agreeing_digits)
-        for one in comparisons
+        for one in answer_comparisons
         if one.has_required_digits
     }
-    own = all(one.problem.number == 0 for one in comparisons)
+    own = all(one.problem.number == 0 for one in answer_comparisons)
     kind = "user-defined problem" if own else "problem"
-    text = pluralize(len(passed), kind) + ("" if own else f" of {len(shipped_problem_files())}")
+    text = format_count_with_noun(len(passed), kind) + (
+        "" if own else f" of {len(find_shipped_problem_files())}"
+    )
     if not passed:
         return text
     low, high = min(passed.values()), max(passed.values())

@@ -12,35 +12,38 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.reporting.cell_tables import (
-        build_frame_of_cells,
+        build_data_frame_of_cells,
+        build_failed_cells_table,
+        count_cells_by_status,
         count_pending_cells,
-        count_statuses,
-        failures_table,
         format_notes_on_incomplete_results,
         format_status_counts,
     )
-    from rsfstudy.reporting.event_tables import build_record_events_pieces, list_record_events
-    from rsfstudy.reporting.fit_summaries import format_with_error
+    from rsfstudy.reporting.event_tables import (
+        build_record_events_tables_and_sentences,
+        summarise_record_events_as_fields,
+    )
+    from rsfstudy.reporting.fit_summaries import format_value_with_stderr
     from rsfstudy.reporting.fit_tables import (
-        all_fits_are_valid,
-        fit_table,
-        is_fit,
-        list_fit_values,
+        are_all_fits_valid,
+        build_fit_table,
+        contains_fits,
         split_into_single_fits,
+        summarise_fits_as_fields,
     )
     from rsfstudy.reporting.hold_summaries import is_hold_table, summarise_holds
     from rsfstudy.reporting.lattice_tables import (
         summarise_study_as_text_lines,
     )
     from rsfstudy.reporting.machine_readable import (
-        build_contents_table,
-        classify_contents,
+        build_result_variables_table,
+        classify_file_contents,
         summarise_file_as_fields,
         summarise_study_as_fields,
     )
     from rsfstudy.reporting.origin_tables import (
         describe_scene_and_rig_fields,
-        note_on_norms_near_load_velocity,
+        describe_slow_instability_norms,
     )
     from rsfstudy.reporting.reduction_tables import (
         build_reduction_tables_and_sentences,
@@ -57,9 +60,9 @@ if TYPE_CHECKING:
         format_number_or_dash,
     )
     from rsfstudy.reporting.verdict_tables import (
-        claims_table,
-        count_verdicts,
-        summarise_verdicts,
+        build_claims_table,
+        format_verdict_counts,
+        summarise_verdicts_and_failures,
     )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -117,36 +120,36 @@ else:
 __all__ = [
     "SummaryTableOrSentence",
     "TextTable",
-    "all_fits_are_valid",
-    "build_contents_table",
-    "build_record_events_pieces",
-    "list_record_events",
-    "build_frame_of_cells",
+    "are_all_fits_valid",
+    "build_result_variables_table",
+    "build_record_events_tables_and_sentences",
+    "summarise_record_events_as_fields",
+    "build_data_frame_of_cells",
     "build_motion_tables_and_sentences",
     "build_reduction_tables_and_sentences",
     "build_summary_tables_and_sentences",
-    "claims_table",
-    "classify_contents",
+    "build_claims_table",
+    "classify_file_contents",
     "count_pending_cells",
-    "count_statuses",
-    "count_verdicts",
+    "count_cells_by_status",
+    "format_verdict_counts",
     "describe_dataset_origin",
     "describe_scene_and_rig_fields",
-    "failures_table",
-    "fit_table",
+    "build_failed_cells_table",
+    "build_fit_table",
     "format_notes_on_incomplete_results",
     "format_number_or_dash",
     "format_status_counts",
-    "format_with_error",
-    "is_fit",
+    "format_value_with_stderr",
+    "contains_fits",
     "is_hold_table",
     "is_motion",
-    "list_fit_values",
-    "note_on_norms_near_load_velocity",
+    "summarise_fits_as_fields",
+    "describe_slow_instability_norms",
     "split_into_single_fits",
     "summarise_file_as_fields",
     "summarise_holds",
     "summarise_study_as_fields",
     "summarise_study_as_text_lines",
-    "summarise_verdicts",
+    "summarise_verdicts_and_failures",
 ]

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.formatting import format_nonempty_fields, pluralize
+from rsfstudy.formatting import format_count_with_noun, format_nonempty_fields
 from rsfstudy.reporting.reduction_tables import (
-    find_refusal_reasons_of_reductions,
+    find_reasons_of_refused_reductions,
     format_missing_results,
 )
 from rsfstudy.reporting.tables import TextTable
@@ -20,10 +20,10 @@ from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 
 #: Maximum number of failed cells in a table.
-_MAX_FAILURES = 20
+_MAX_FAILED_CELLS_IN_TABLE = 20
 
 
-def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
+def count_cells_by_status(dataset: xr.Dataset) -> Mapping[str, int]:
     """Count the cells with each status.
 
     Parameters
@@ -40,7 +40,7 @@ def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
     return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
 
 
-def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
+def count_failed_cells_by_status(dataset: xr.Dataset) -> Mapping[str, int]:
     """Count the failed cells with each status.
 
     Parameters
@@ -55,7 +55,7 @@ def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
     """
     return {
         label: n
-        for label, n in count_statuses(dataset).items()
+        for label, n in count_cells_by_status(dataset).items()
         if not Status[label.upper()].is_answer
     }
 
@@ -91,7 +91,7 @@ def format_status_counts(dataset: xr.Dataset) -> str:
         right-hand-side evaluations. If no cell has the status ``ok``, the string also explains each
         status.
     """
-    work, counts = int(dataset["rhs_evaluations"].sum()), count_statuses(dataset)
+    work, counts = int(dataset["rhs_evaluations"].sum()), count_cells_by_status(dataset)
     nothing = Status.OK.label not in counts
     told = ", ".join(
         f"{count} {label}" + f" ({Status[label.upper()].meaning})" * nothing
@@ -113,16 +113,16 @@ def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
     list of str
         Notes for the user. The list is empty if no cell failed and all reductions have results.
     """
-    reasons = find_refusal_reasons_of_reductions(results)
+    reasons = find_reasons_of_refused_reductions(results)
     told = [": ".join(note) for note in format_missing_results(results, reasons).items()]
-    if failed := count_failures(results):
+    if failed := count_failed_cells_by_status(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
         told = [first, *told, "use dataset.rsf.failures() for a list"]
     return told
 
 
-def failures_table(dataset: xr.Dataset, file: str) -> TextTable:
+def build_failed_cells_table(dataset: xr.Dataset, results_file: str) -> TextTable:
     """Build a table of failed cells, with commands that recompute the cells.
 
     Parameters
@@ -141,27 +141,27 @@ def failures_table(dataset: xr.Dataset, file: str) -> TextTable:
     """
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
-    found = build_frame_of_cells(dataset, failed, list(map(str, failed.dims)))
-    first = found[:_MAX_FAILURES]
+    found = build_data_frame_of_cells(dataset, failed, list(map(str, failed.dims)))
+    first = found[:_MAX_FAILED_CELLS_IN_TABLE]
     places: list[dict[Any, Any]] = first[list(failed.dims)].to_dict("records")
     rows = [
         {"cell": format_nonempty_fields(place), "status": label, "message": message}
         for place, label, message in zip(places, first["status"], first["message"], strict=True)
     ]
-    commands = [format_recompute_command(dataset, file, place) for place in places]
+    commands = [format_recompute_command(dataset, results_file, place) for place in places]
     values = [
         {"coordinates": place, "status": label, "message": message, "command": command}
         for place, label, message, command in zip(
             places, first["status"], first["message"], commands, strict=True
         )
     ]
-    caption = f"{pluralize(len(found), 'cell')} failed"
+    caption = f"{format_count_with_noun(len(found), 'cell')} failed"
     if len(found) > len(rows):
         caption += f" (first {len(rows)} shown)"
-    return TextTable(rows, caption, {"cell", "message"}, values=values)
+    return TextTable(rows, caption, {"cell", "message"}, unformatted_rows=values)
 
 
-def build_frame_of_cells(
+def build_data_frame_of_cells(
     dataset: xr.Dataset, cell_mask: xr.DataArray, axis_names: Sequence[str]
 ) -> pd.DataFrame:
     """Build a table of selected cells.

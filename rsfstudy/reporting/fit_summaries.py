@@ -11,12 +11,12 @@ import xarray as xr
 
 from rsfstudy.fitting import PARAMETERS, describe_whiteness, split_window_number
 from rsfstudy.reporting.fit_tables import (
-    normal_stresses_in_mpa,
-    parameter_headings,
-    record_and_step_of_fit,
+    find_normal_stresses_in_mpa,
+    find_parameter_headings,
+    find_record_and_step_of_fit,
+    find_status_label_of_fit,
+    find_stderr_of_fixed_stiffness,
     split_into_single_fits,
-    status_label_of_fit,
-    stderr_of_fixed_stiffness,
 )
 from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
@@ -54,7 +54,7 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     """
     places: dict[str, list[xr.Dataset]] = {}
     for one in split_into_single_fits(dataset):
-        where = ", ".join(f"{n} {value}" for n, value in record_and_step_of_fit(one).items())
+        where = ", ".join(f"{n} {value}" for n, value in find_record_and_step_of_fit(one).items())
         places.setdefault(where, []).append(one)
     measure: Any = StoredDataset(dataset).declaration.measure
     together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
@@ -67,22 +67,22 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
         if together:
             yield f"joint fit: {together}; the window of the first step is shown"
         for first in range(0, len(fits), _MAX_FITS_PER_TABLE):
-            yield _parameter_table(where, fits[first : first + _MAX_FITS_PER_TABLE])
+            yield _build_parameter_table(where, fits[first : first + _MAX_FITS_PER_TABLE])
         for one in fits:
             yield from _iterate_fit_remarks(one)
         yield from _compare_laws_of_fits(fits)
     fitted = [one for where, fits in places.items() if where not in unfitted for one in fits]
     if several and fitted:
-        yield TextTable([_summary_row_of_fit(one) for one in fitted], "All fits:")
+        yield TextTable([_build_summary_row_of_fit(one) for one in fitted], "All fits:")
 
 
-def _describe_unfitted_step(place: str, fits: Sequence[xr.Dataset]) -> str:
+def _describe_unfitted_step(record_and_step: str, fits: Sequence[xr.Dataset]) -> str:
     """Return a sentence with the reason why no law was fitted to a step."""
     reasons = {
-        str(one["message"].item()) or status_label_of_fit(one).replace("_", " "): None
+        str(one["message"].item()) or find_status_label_of_fit(one).replace("_", " "): None
         for one in fits
     }
-    return f"{place} is not fitted: {'; '.join(reasons)}"
+    return f"{record_and_step} is not fitted: {'; '.join(reasons)}"
 
 
 def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
@@ -103,37 +103,39 @@ def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
         yield f"{law} fits best: its AIC is lower by {by:.1f}, which is {enough}"
 
 
-def _summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
+def _build_summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
     """Return the row that represents a fit in the summary table."""
     few = {
-        n: format_with_stderr(fit, name)
-        for name, n in parameter_headings(fit).items()
+        n: format_parameter_with_stderr(fit, name)
+        for name, n in find_parameter_headings(fit).items()
         if n in _PARAMETERS_IN_FIT_SUMMARY
     }
-    at = {n: str(value) for n, value in record_and_step_of_fit(fit).items()}
-    return {**at, "law": str(fit["law"].item()), **few, "status": status_label_of_fit(fit)}
+    at = {n: str(value) for n, value in find_record_and_step_of_fit(fit).items()}
+    return {**at, "law": str(fit["law"].item()), **few, "status": find_status_label_of_fit(fit)}
 
 
-def _parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
+def _build_parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
     """Return a table of the parameters with one column per fit."""
     columns = {str(one["law"].item()): _build_parameter_column(one) for one in fits}
     headings = next(iter(columns.values()))
     rows = [{"parameter": h, **{law: c[h] for law, c in columns.items()}} for h in headings]
-    windows = (_describe_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
+    windows = (_describe_fit_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
     return TextTable(rows, "\n".join(filter(None, (table_title, next(windows, "")))))
 
 
 def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
     """Return a table column with the parameters, quality and noise of a fit."""
     found = {
-        n + _bracketed_units(split_window_number(name)[0]): format_with_stderr(fit, name)
-        for name, n in parameter_headings(fit).items()
+        n + _format_units_in_brackets(split_window_number(name)[0]): format_parameter_with_stderr(
+            fit, name
+        )
+        for name, n in find_parameter_headings(fit).items()
     }
     if "window_stiffness" in fit and "stiffness" not in fit["parameter"].values:
-        value, stderr = fit["window_stiffness"].item(), stderr_of_fixed_stiffness(fit)
-        text = format_with_error(value, stderr) if stderr else f"{value:.6g}"
-        found["k" + _bracketed_units("stiffness")] = text
-    stresses = [f"{stress:.6g}" for stress in normal_stresses_in_mpa(fit).values()]
+        value, stderr = fit["window_stiffness"].item(), find_stderr_of_fixed_stiffness(fit)
+        text = format_value_with_stderr(value, stderr) if stderr else f"{value:.6g}"
+        found["k" + _format_units_in_brackets("stiffness")] = text
+    stresses = [f"{stress:.6g}" for stress in find_normal_stresses_in_mpa(fit).values()]
     if stresses:
         found["normal stress (MPa)"] = ", ".join(stresses)
     quality = dict.fromkeys(("R2", "AIC", "noise", "effective sample size"), "-")
@@ -146,10 +148,10 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
             "noise": f"{process}, sd {fit['noise_sd'].item():.2g}",
             "effective sample size": f"{fit['n_eff'].item():.0f}",
         }
-    return found | quality | {"status": status_label_of_fit(fit)}
+    return found | quality | {"status": find_status_label_of_fit(fit)}
 
 
-def _bracketed_units(parameter_name: str) -> str:
+def _format_units_in_brackets(parameter_name: str) -> str:
     """Return the units of a parameter in brackets.
 
     The string is empty if the parameter is dimensionless.
@@ -160,7 +162,7 @@ def _bracketed_units(parameter_name: str) -> str:
     return "" if units == "1" else f" ({units})"
 
 
-def _describe_window(fit: xr.Dataset) -> str:
+def _describe_fit_window(fit: xr.Dataset) -> str:
     """Describe the velocities before and after the step, and the fitted window."""
     speeds = (fit[n].item() for n in ("velocity_before", "velocity_after"))
     ends = (fit[n].item() for n in ("window_begins", "window_ends"))
@@ -171,7 +173,7 @@ def _describe_window(fit: xr.Dataset) -> str:
     )
 
 
-def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
+def format_parameter_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
     """Format the value of a fitted parameter with its standard error.
 
     The value and the error are rounded to two significant digits of the error.
@@ -188,12 +190,14 @@ def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
     str
         Formatted parameter. An asterisk marks a standard error that is not valid.
     """
-    text = format_with_error(fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item())
-    is_marked = " +- " in text and status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label
+    text = format_value_with_stderr(
+        fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item()
+    )
+    is_marked = " +- " in text and find_status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label
     return text + _MARK_OF_INVALID_STDERRS * is_marked
 
 
-def format_with_error(value: float, error: float) -> str:
+def format_value_with_stderr(value: float, stderr: float) -> str:
     """Format a value with its standard error.
 
     The value and the error are rounded to two significant digits of the error.
@@ -210,18 +214,18 @@ def format_with_error(value: float, error: float) -> str:
     """
     if not math.isfinite(value):
         return "-"
-    if error > _MAX_PRINTED_RELATIVE_ERROR * abs(value) > 0.0:
+    if stderr > _MAX_PRINTED_RELATIVE_ERROR * abs(value) > 0.0:
         return "unconstrained"
-    if not (math.isfinite(error) and error > 0.0):
-        return f"{value:.6g} +- {error:g}"
-    digits = 1 - math.floor(math.log10(error))
-    size = math.floor(math.log10(max(abs(value), error)))
+    if not (math.isfinite(stderr) and stderr > 0.0):
+        return f"{value:.6g} +- {stderr:g}"
+    digits = 1 - math.floor(math.log10(stderr))
+    size = math.floor(math.log10(max(abs(value), stderr)))
     if -5 <= size < 6 and digits <= 9:
         digits = max(digits, 0)
-        return f"{value:z.{digits}f} +- {error:.{digits}f}"
+        return f"{value:z.{digits}f} +- {stderr:.{digits}f}"
     scale = 10.0**size
     digits = max(digits + size, 0)
-    return f"({value / scale:z.{digits}f} +- {error / scale:.{digits}f})e{size:+03d}"
+    return f"({value / scale:z.{digits}f} +- {stderr / scale:.{digits}f})e{size:+03d}"
 
 
 def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
@@ -232,12 +236,12 @@ def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     If there are posterior samples, the remarks include credible intervals.
     """
     law, message = fit["law"].item(), str(fit["message"].item())
-    if status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label:
+    if find_status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label:
         mark = _MARK_OF_INVALID_STDERRS
         yield f"{law}: standard errors marked by {mark} are not valid: {message}"
     elif message:
-        yield f"{law}: {status_label_of_fit(fit).replace('_', ' ')}: {message}"
-    short = parameter_headings(fit)
+        yield f"{law}: {find_status_label_of_fit(fit).replace('_', ' ')}: {message}"
+    short = find_parameter_headings(fit)
     spreads = ((short[n], fit[f"{n}_windows"].item()) for n in short if f"{n}_windows" in fit)
     if each := ", ".join(f"{n} {value:.2g}" for n, value in spreads if not math.isnan(value)):
         yield f"{law}: range of the parameters over the windows: {each}"

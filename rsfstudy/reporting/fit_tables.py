@@ -16,7 +16,7 @@ from rsfstudy.fitting import (
     split_window_number,
 )
 from rsfstudy.former_data_names import TableWithFormerColumns, rename_former_variables
-from rsfstudy.quantities import units_or_scale_of_variable
+from rsfstudy.quantities import read_units_or_scale
 from rsfstudy.reporting.tables import format_units
 from rsfstudy.status import Status
 
@@ -33,7 +33,7 @@ _LABORATORY_NAME_BY_PARAMETER_NAME = {
 _STATUS_LABELS_OF_FITS_WITH_VALUES = (Status.OK.label, Status.NOT_IDENTIFIED.label)
 
 
-def is_fit(dataset: xr.Dataset) -> bool:
+def contains_fits(dataset: xr.Dataset) -> bool:
     """Return True if a dataset contains fits of records.
 
     Parameters
@@ -70,7 +70,7 @@ def split_into_single_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
     DataError
         If the dataset contains no fits.
     """
-    if not is_fit(dataset):
+    if not contains_fits(dataset):
         raise DataError("the dataset contains no fit. Use a dataset from rsfstudy.fit.")
     dataset = rename_former_variables(dataset)
     if "part" in dataset.dims:
@@ -80,7 +80,7 @@ def split_into_single_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
     return [dataset.isel(dict(zip(dims, at, strict=True))) for at in np.ndindex(*sizes)]
 
 
-def record_and_step_of_fit(fit: xr.Dataset) -> dict[str, Any]:
+def find_record_and_step_of_fit(fit: xr.Dataset) -> dict[str, Any]:
     """Return the record name and the step number of a fit.
 
     Parameters
@@ -98,7 +98,7 @@ def record_and_step_of_fit(fit: xr.Dataset) -> dict[str, Any]:
     return {n: value if n == "record" else int(value) for n, value in found.items()}
 
 
-def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
+def find_parameter_headings(fit: xr.Dataset) -> dict[str, str]:
     """Return the column headings of the fitted parameters.
 
     Parameters
@@ -136,7 +136,7 @@ def scene_fields_set_by_fit(dataset: xr.Dataset) -> set[str]:
     set of str
         Names of scene fields. The set is empty if the dataset contains no fits.
     """
-    if not is_fit(dataset):
+    if not contains_fits(dataset):
         return set()
     fitted = {split_window_number(str(name))[0] for name in dataset["parameter"].values}
     fields = fitted | {"stiffness", "stiffness_ratio", "reference_rate"}
@@ -150,10 +150,13 @@ class FitTable(TableWithFormerColumns):
     Selections from the table are ordinary data frames.
     """
 
-    NEW_COLUMNS: ClassVar[Mapping[str, str]] = {"criterion": "aic", "_std": "_stderr"}
+    NEW_COLUMN_BY_FORMER_COLUMN: ClassVar[Mapping[str, str]] = {
+        "criterion": "aic",
+        "_std": "_stderr",
+    }
 
 
-def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
+def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     """Return a table of fits with the column names used in laboratories.
 
     Parameters
@@ -182,28 +185,28 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     rows = []
     units: dict[str, str] = {}
     for one in split_into_single_fits(dataset):
-        row: dict[str, Any] = dict(record_and_step_of_fit(one))
-        for name, short in parameter_headings(one).items():
+        row: dict[str, Any] = dict(find_record_and_step_of_fit(one))
+        for name, short in find_parameter_headings(one).items():
             for suffix in ("", "_stderr", "_windows"):
                 if f"{name}{suffix}" in one:
                     row[f"{short}{suffix}"] = one[f"{name}{suffix}"].item()
-                    units[f"{short}{suffix}"] = units_or_scale_of_variable(one[name].attrs)
+                    units[f"{short}{suffix}"] = read_units_or_scale(one[name].attrs)
         for short, name in (("V0", "velocity_before"), ("V1", "velocity_after")):
-            row[short], units[short] = one[name].item(), units_or_scale_of_variable(one[name].attrs)
+            row[short], units[short] = one[name].item(), read_units_or_scale(one[name].attrs)
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
-        stresses = normal_stresses_in_mpa(one)
+        stresses = find_normal_stresses_in_mpa(one)
         row |= stresses
         units |= dict.fromkeys(stresses, "MPa")
         if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
             row["k"] = one["window_stiffness"].item()
-            if stderr := stderr_of_fixed_stiffness(one):
+            if stderr := find_stderr_of_fixed_stiffness(one):
                 row["k_stderr"] = stderr
             units |= dict.fromkeys(
-                ("k", "k_stderr"), units_or_scale_of_variable(one["window_stiffness"].attrs)
+                ("k", "k_stderr"), read_units_or_scale(one["window_stiffness"].attrs)
             )
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["aic"] = one["r_squared"].item(), one["aic"].item()
-        row["p_value"], row["status"] = one["p_value"].item(), status_label_of_fit(one)
+        row["p_value"], row["status"] = one["p_value"].item(), find_status_label_of_fit(one)
         rows.append(row)
     table = FitTable(rows)
     table.attrs["units"] = {
@@ -212,7 +215,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     return table
 
 
-def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
+def summarise_fits_as_fields(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the results of each fit as a dictionary for JSON output.
 
     Parameters
@@ -238,9 +241,9 @@ def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return [
         {
             **dict.fromkeys(("record", "step")),
-            **record_and_step_of_fit(one),
+            **find_record_and_step_of_fit(one),
             "law": str(one["law"].item()) if "law" in one.coords else None,
-            "status": status_label_of_fit(one),
+            "status": find_status_label_of_fit(one),
             "message": str(one["message"].item()),
             "parameters": [
                 {
@@ -249,7 +252,7 @@ def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
                     "value": one[name].item(),
                     "stderr": one[f"{name}_stderr"].item(),
                 }
-                for name in parameter_headings(one)
+                for name in find_parameter_headings(one)
             ],
             **{name: one[name].item() for name in numbers},
         }
@@ -257,7 +260,7 @@ def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
     ]
 
 
-def normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
+def find_normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
     """Return the normal stress before each step in MPa.
 
     Parameters
@@ -278,7 +281,7 @@ def normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
     return {n.replace("_before", ""): stress for n, stress in known.items()}
 
 
-def stderr_of_fixed_stiffness(fit: xr.Dataset) -> float:
+def find_stderr_of_fixed_stiffness(fit: xr.Dataset) -> float:
     """Return the standard error of a stiffness that is not fitted.
 
     Parameters
@@ -296,7 +299,7 @@ def stderr_of_fixed_stiffness(fit: xr.Dataset) -> float:
     return float(np.nan_to_num(fit["window_stiffness_stderr"].item()))
 
 
-def status_label_of_fit(fit: xr.Dataset) -> str:
+def find_status_label_of_fit(fit: xr.Dataset) -> str:
     """Return the status label of a fit.
 
     Parameters
@@ -312,7 +315,7 @@ def status_label_of_fit(fit: xr.Dataset) -> str:
     return Status.labels_by_code()[int(fit["status"])]
 
 
-def all_fits_are_valid(dataset: xr.Dataset) -> bool:
+def are_all_fits_valid(dataset: xr.Dataset) -> bool:
     """Return True if each fit has values and valid standard errors.
 
     Parameters
@@ -331,6 +334,6 @@ def all_fits_are_valid(dataset: xr.Dataset) -> bool:
         If the dataset contains no fits.
     """
     return all(
-        status_label_of_fit(one) in _STATUS_LABELS_OF_FITS_WITH_VALUES
+        find_status_label_of_fit(one) in _STATUS_LABELS_OF_FITS_WITH_VALUES
         for one in split_into_single_fits(dataset)
     )

@@ -12,11 +12,11 @@ import xarray as xr
 
 from rsfstudy.formatting import format_list, format_value
 from rsfstudy.reporting.cell_tables import format_status_counts
-from rsfstudy.reporting.reduction_tables import names_of_slope_reductions
+from rsfstudy.reporting.reduction_tables import list_names_of_slope_reductions
 from rsfstudy.reporting.tables import (
-    MAX_CELLS_SHOWN,
-    Column,
+    MAX_CELLS_IN_THINNED_TABLE,
     TextTable,
+    TextTableColumn,
     build_table_along_dimensions,
     format_axis_name,
     format_number_or_dash,
@@ -50,24 +50,30 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     TextTable
         Table of the primary output. The table is empty if the study has no primary output.
     """
-    name = StoredDataset(dataset).primary_output
+    name = StoredDataset(dataset).primary_output_name
     if name is None:
         return TextTable([])
-    dataset = DatasetUnits(dataset).convert_for_display()
-    name = name if name in dataset else DatasetUnits.dimensional_name(name)
+    dataset = DatasetUnits(dataset).convert_to_display_units()
+    name = name if name in dataset else DatasetUnits.convert_to_dimensional_name(name)
     dims = dataset["status"].dims
     drawn = [n for n in _find_fields_along_numbered_axes(dataset) if n in dataset.coords]
-    columns = [Column(format_axis_name(dataset[n]), n, format_value) for n in drawn]
-    columns.append(Column(name, name, format_number_or_dash, "value"))
+    columns = [TextTableColumn(format_axis_name(dataset[n]), n, format_value) for n in drawn]
+    columns.append(TextTableColumn(name, name, format_number_or_dash, "value"))
     if f"{name}_error" in dataset:
         short = partial(format_number_or_dash, format_specification=".1e")
-        columns.append(Column("error", f"{name}_error", short, "error"))
+        columns.append(TextTableColumn("error", f"{name}_error", short, "error"))
     size, fewer = dataset["status"].size, 1 + len(drawn) // _MAX_FIELDS_PER_POINT_WITHOUT_THINNING
-    most = size if size <= _MAX_CELLS_SHOWN_WITHOUT_THINNING // fewer else MAX_CELLS_SHOWN // fewer
+    most = (
+        size
+        if size <= _MAX_CELLS_SHOWN_WITHOUT_THINNING // fewer
+        else MAX_CELLS_IN_THINNED_TABLE // fewer
+    )
     at = select_thinned_points({str(d): dataset.sizes[d] for d in dims}, most)
-    few = dataset[[*(column.variable for column in columns), "status"]].isel(at).load()
+    few = dataset[[*(column.variable_name for column in columns), "status"]].isel(at).load()
     if (few["status"] != int(Status.OK)).any():
-        columns.append(Column("status", "status", Status.labels_by_code().__getitem__, "status"))
+        columns.append(
+            TextTableColumn("status", "status", Status.labels_by_code().__getitem__, "status")
+        )
     units, shown = format_units(dataset[name]), few["status"].size
     caption = str(dataset[name].attrs.get("long_name", name)) + f", in {units}" * (units != "1")
     if shown < size:
@@ -77,7 +83,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
         caption += f" ({which}; to write all cells, use rsfstudy export --csv)"
     table = build_table_along_dimensions(few, dims, columns, caption)
     about = {"name": name, "units": units}
-    return replace(table, values=[{**about, **row} for row in table.values])
+    return replace(table, values=[{**about, **row} for row in table.unformatted_rows])
 
 
 def _find_fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
@@ -132,14 +138,16 @@ def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
         Lines of text: the range of the primary output, one line per slope, and the number of cells
         with each status.
     """
-    lines, converted = [], DatasetUnits(dataset).convert_for_display()
-    if (name := StoredDataset(dataset).primary_output) is not None:
-        values = converted[name if name in converted else DatasetUnits.dimensional_name(name)]
+    lines, converted = [], DatasetUnits(dataset).convert_to_display_units()
+    if (name := StoredDataset(dataset).primary_output_name) is not None:
+        values = converted[
+            name if name in converted else DatasetUnits.convert_to_dimensional_name(name)
+        ]
         told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
         ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
         text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no values"
         lines.append(f"{values.name}: {text}")
-    for slope in names_of_slope_reductions(converted):
+    for slope in list_names_of_slope_reductions(converted):
         slopes, units = converted[slope].values.ravel().tolist(), format_units(converted[slope])
         lines.append(f"{slope}: {format_list(slopes, ', ')}{f' {units}' * (units != '1')}")
     return [*lines, format_status_counts(dataset)]

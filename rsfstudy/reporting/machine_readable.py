@@ -11,12 +11,19 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.reporting.cell_tables import count_pending_cells, count_statuses, failures_table
-from rsfstudy.reporting.fit_tables import is_fit, list_fit_values
+from rsfstudy.reporting.cell_tables import (
+    build_failed_cells_table,
+    count_cells_by_status,
+    count_pending_cells,
+)
+from rsfstudy.reporting.fit_tables import contains_fits, summarise_fits_as_fields
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
 from rsfstudy.reporting.origin_tables import find_constant_fields
-from rsfstudy.reporting.reduction_tables import build_reduction_tables, missing_result_reasons
-from rsfstudy.reporting.summaries import is_motion, measure_motion
+from rsfstudy.reporting.reduction_tables import (
+    build_reduction_tables,
+    find_reasons_of_missing_reductions,
+)
+from rsfstudy.reporting.summaries import compute_duration_and_peaks_of_motion, is_motion
 from rsfstudy.reporting.tables import TextTable, build_single_scene_result_table
 from rsfstudy.storage import StoredDataset
 from rsfstudy.vocabulary import find_coverage_content_type
@@ -38,24 +45,24 @@ def summarise_study_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     dict of str to object
         Number of cells by status, reductions, missing reductions and failed cells.
     """
-    rows = [row for table in build_reduction_tables(dataset) for row in table.values]
+    rows = [row for table in build_reduction_tables(dataset) for row in table.unformatted_rows]
     return {
         "study": dataset.attrs["id"],
         "title": dataset.attrs["title"],
         "file": file,
         "completeness": dataset.attrs["completeness"],
         "overrides": StoredDataset(dataset).declaration.overrides,
-        "statuses": count_statuses(dataset),
+        "statuses": count_cells_by_status(dataset),
         "rhs_evaluations": int(dataset["rhs_evaluations"].sum()),
         "pending_cells": count_pending_cells(dataset),
-        "failed_cells": failures_table(dataset, file).values,
+        "failed_cells": build_failed_cells_table(dataset, file).unformatted_rows,
         "reductions": [row for row in rows if "name" in row],
         "cheapest_integrators": [row for row in rows if "name" not in row],
-        "missing_reductions": missing_result_reasons(dataset),
+        "missing_reductions": find_reasons_of_missing_reductions(dataset),
     }
 
 
-def classify_contents(dataset: xr.Dataset) -> str:
+def classify_file_contents(dataset: xr.Dataset) -> str:
     """Return the kind of data in a file.
 
     Parameters
@@ -69,7 +76,7 @@ def classify_contents(dataset: xr.Dataset) -> str:
         The string "results" for the results of a study, "fit" for fits, "motion" for a motion, or
         "scene" for other results of a single scene.
     """
-    if is_fit(dataset):
+    if contains_fits(dataset):
         return "fit"
     if not StoredDataset(dataset).is_of_single_scene:
         return "results"
@@ -91,30 +98,30 @@ def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     dict of str to object
         Kind of the data, and the fields that the JSON output contains for this kind.
     """
-    kind = classify_contents(dataset)
+    kind = classify_file_contents(dataset)
     about = {"kind": kind, "file": file}
     if kind == "results":
-        return about | _summarise_results(dataset, file)
+        return about | _summarise_study_results_as_fields(dataset, file)
     if kind == "fit":
-        return about | {"fits": list_fit_values(dataset)}
+        return about | {"fits": summarise_fits_as_fields(dataset)}
     about["status"] = dataset.attrs["status"]
     about["message"] = dataset.attrs.get("message", "")
-    scene = {"scene": _select_applicable_fields(StoredDataset(dataset).scene_fields)}
+    scene = {"scene": _omit_fields_with_value_none(StoredDataset(dataset).scene_fields)}
     if kind == "motion":
-        return about | scene | {"motion": measure_motion(dataset)}
-    return about | scene | {"values": build_single_scene_result_table(dataset).values}
+        return about | scene | {"motion": compute_duration_and_peaks_of_motion(dataset)}
+    return about | scene | {"values": build_single_scene_result_table(dataset).unformatted_rows}
 
 
-def _summarise_results(dataset: xr.Dataset, file: str) -> dict[str, Any]:
+def _summarise_study_results_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     """Summarise the results and the provenance of a study."""
     about, sizes = StoredDataset(dataset).provenance, dataset.sizes
     scene, rig = find_constant_fields(dataset)
     return summarise_study_as_fields(dataset, file) | {
         "lattice": {str(dimension): sizes[dimension] for dimension in dataset["status"].dims},
-        "scene": _select_applicable_fields(scene),
+        "scene": _omit_fields_with_value_none(scene),
         "rig": rig,
-        "primary_output": build_primary_output_table(dataset).values,
-        "variables": _list_results(dataset),
+        "primary_output": build_primary_output_table(dataset).unformatted_rows,
+        "variables": _list_result_variables(dataset),
         "provenance": {
             "command_line": about["command"],
             **{name: about[name] for name in ("time", "git", "machine", "versions")},
@@ -122,12 +129,12 @@ def _summarise_results(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     }
 
 
-def _select_applicable_fields(fields: Mapping[str, Any]) -> dict[str, Any]:
+def _omit_fields_with_value_none(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a scene that are not None."""
     return {name: value for name, value in fields.items() if value is not None}
 
 
-def _list_results(dataset: xr.Dataset) -> list[dict[str, Any]]:
+def _list_result_variables(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the name, description and dimensions of each result in a dataset."""
     return [
         {
@@ -140,7 +147,7 @@ def _list_results(dataset: xr.Dataset) -> list[dict[str, Any]]:
     ]
 
 
-def build_contents_table(dataset: xr.Dataset) -> TextTable:
+def build_result_variables_table(dataset: xr.Dataset) -> TextTable:
     """Build a table of the result variables in a dataset.
 
     Parameters
@@ -153,7 +160,7 @@ def build_contents_table(dataset: xr.Dataset) -> TextTable:
     TextTable
         Table with the name, the description and the dimensions of each result variable.
     """
-    found = _list_results(dataset)
+    found = _list_result_variables(dataset)
     rows = [
         {
             "variable": one["name"],
@@ -161,4 +168,4 @@ def build_contents_table(dataset: xr.Dataset) -> TextTable:
         }
         for one in found
     ]
-    return TextTable(rows, "", {"description"}, values=found)
+    return TextTable(rows, "", {"description"}, unformatted_rows=found)

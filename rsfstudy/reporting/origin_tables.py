@@ -8,7 +8,7 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.formatting import format_nonempty_fields, pluralize
+from rsfstudy.formatting import format_count_with_noun, format_nonempty_fields
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reporting.cell_tables import format_status_counts
 from rsfstudy.reporting.fit_tables import scene_fields_set_by_fit
@@ -117,7 +117,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     }
 
 
-def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
+def describe_slow_instability_norms(dataset: xr.Dataset) -> str:
     """Return a note if an instability norm is close to the load point velocity.
 
     Parameters
@@ -136,4 +136,4 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
     near = [text for text in ok.tolist() if text.startswith(CriticalStep.SLOW_NORM_WARNING_PREFIX)]
-    return f"{len(near)} of {pluralize(len(ok), 'result')}: {near[0]}" if near else ""
+    return f"{len(near)} of {format_count_with_noun(len(ok), 'result')}: {near[0]}" if near else ""

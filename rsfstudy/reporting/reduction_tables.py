@@ -11,8 +11,8 @@ import xarray as xr
 
 from rsfstudy.formatting import format_value
 from rsfstudy.reporting.tables import (
-    Column,
     TextTable,
+    TextTableColumn,
     build_table_along_dimensions,
     format_axis_name,
     format_units,
@@ -21,7 +21,7 @@ from rsfstudy.rig import DatasetUnits
 from rsfstudy.storage import StoredDataset
 
 #: Headings and formats of the columns of a slope table, by the suffix of the variable name.
-_COLUMNS_OF_SLOPE_TABLE = {
+_SLOPE_TABLE_COLUMN_BY_SUFFIX = {
     "stderr": ("standard error", ".2g"),
     "misfit": ("largest misfit", ".2g"),
     "points": ("points", ".0f"),
@@ -30,16 +30,16 @@ _COLUMNS_OF_SLOPE_TABLE = {
 #: Maximum number of points that a note on missing results lists.
 _MAX_MISSING_POINTS_SHOWN = 4
 #: Columns of the comparison of integrators.
-_INTEGRATOR_COLUMNS = (
-    Column("cheapest integrator", "cheapest_integrator", str, "integrator"),
-    Column("evaluations", "cheapest_work", "{:,.0f}".format, "work"),
-    Column(
+_INTEGRATOR_COMPARISON_COLUMNS = (
+    TextTableColumn("cheapest integrator", "cheapest_integrator", str, "integrator"),
+    TextTableColumn("evaluations", "cheapest_work", "{:,.0f}".format, "work"),
+    TextTableColumn(
         "evaluations (default integrator)",
         "cheapest_default_work",
         "{:,.0f}".format,
         "default_work",
     ),
-    Column(
+    TextTableColumn(
         "rtol (default integrator)",
         "cheapest_default_request",
         lambda digits: f"{10.0**-digits:.1g}",
@@ -62,34 +62,36 @@ def build_reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
         One table for each reduction with a standard error, such as a slope. If the study compares
         integrators, a final table lists the cheapest integrator for each accuracy.
     """
-    converted = DatasetUnits(dataset).convert_for_display()
-    for slope in names_of_slope_reductions(converted):
-        yield _slope_table(converted, slope)
-    if {column.variable for column in _INTEGRATOR_COLUMNS} <= set(dataset.data_vars):
+    converted = DatasetUnits(dataset).convert_to_display_units()
+    for slope in list_names_of_slope_reductions(converted):
+        yield _build_slope_table(converted, slope)
+    if {column.variable_name for column in _INTEGRATOR_COMPARISON_COLUMNS} <= set(
+        dataset.data_vars
+    ):
         dims = dataset["cheapest_work"].dims
         yield build_table_along_dimensions(
-            dataset, dims, _INTEGRATOR_COLUMNS, wrappable_columns={"problem", "cheapest"}
+            dataset, dims, _INTEGRATOR_COMPARISON_COLUMNS, wrappable_columns={"problem", "cheapest"}
         )
 
 
-def _slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
+def _build_slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
     """Return a table of a slope, with its standard error and largest deviation."""
     slope = dataset[reduction_name]
     units, description = format_units(slope), slope.attrs.get("comment", reduction_name)
     heading = f"{reduction_name} ({units})" if units != "1" else reduction_name
-    columns = [Column(heading, reduction_name, format_value, "value")]
-    for suffix, (heading, form) in _COLUMNS_OF_SLOPE_TABLE.items():
+    columns = [TextTableColumn(heading, reduction_name, format_value, "value")]
+    for suffix, (heading, form) in _SLOPE_TABLE_COLUMN_BY_SUFFIX.items():
         if (name := f"{reduction_name}_{suffix}") in dataset:
             if suffix != "points" and (own := format_units(dataset[name])) != units:
                 heading += f" ({own})"
-            columns.append(Column(heading, name, f"{{:{form}}}".format, suffix))
+            columns.append(TextTableColumn(heading, name, f"{{:{form}}}".format, suffix))
     names = {format_axis_name(dataset[d]) for d in slope.dims}
     table = build_table_along_dimensions(dataset, slope.dims, columns, description, names)
     about = {"name": reduction_name, "units": units}
-    return replace(table, values=[{**about, **row} for row in table.values])
+    return replace(table, values=[{**about, **row} for row in table.unformatted_rows])
 
 
-def names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:
+def list_names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:
     """Return the names of the reductions that have a standard error.
 
     Parameters
@@ -120,11 +122,11 @@ def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTa
         Tables, followed by one sentence per reduction without results.
     """
     yield from build_reduction_tables(dataset)
-    reasons = missing_result_reasons(dataset)
+    reasons = find_reasons_of_missing_reductions(dataset)
     yield from (": ".join(note) for note in format_missing_results(dataset, reasons).items())
 
 
-def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
+def find_reasons_of_refused_reductions(dataset: xr.Dataset) -> dict[str, str]:
     """Find the reasons why reductions were not computed, such as failed cells.
 
     Parameters
@@ -192,7 +194,7 @@ def _format_point(values: xr.DataArray, indices: Sequence[int]) -> str:
     return ", ".join(f"{d} = {format_value(point[d].item())}" for d in values.dims)
 
 
-def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
+def find_reasons_of_missing_reductions(dataset: xr.Dataset) -> dict[str, str]:
     """Find the reasons why reductions have no results.
 
     Parameters
@@ -205,7 +207,7 @@ def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
     dict of str to str
         Reasons by reduction name.
     """
-    found, there = find_refusal_reasons_of_reductions(dataset), tuple(map(str, dataset.data_vars))
+    found, there = find_reasons_of_refused_reductions(dataset), tuple(map(str, dataset.data_vars))
     for stated_as in StoredDataset(dataset).declaration.reductions:
         about: Mapping[str, Any] = {**stated_as}
         if not any(name.startswith(about["name"]) for name in there):

@@ -20,11 +20,11 @@ from rsfstudy.reporting.fit_summaries import summarise_fits
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
 from rsfstudy.reporting.reduction_tables import (
     build_reduction_tables,
-    find_refusal_reasons_of_reductions,
+    find_reasons_of_refused_reductions,
     format_missing_results,
 )
 from rsfstudy.reporting.tables import (
-    MAX_CELLS_SHOWN,
+    MAX_CELLS_IN_THINNED_TABLE,
     TextTable,
     build_single_scene_result_table,
     format_number_or_dash,
@@ -51,18 +51,18 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
         The summary of a motion includes the peak friction, the peak slip rate, the stability of the
         scene and the events.
     """
-    if fit_tables.is_fit(dataset):
+    if fit_tables.contains_fits(dataset):
         yield from summarise_fits(dataset)
     elif not StoredDataset(dataset).is_of_single_scene:
         yield build_primary_output_table(dataset)
         yield from build_reduction_tables(dataset)
-        yield format_missing_results(dataset, find_refusal_reasons_of_reductions(dataset))
-        yield from filter(None, [origin_tables.note_on_norms_near_load_velocity(dataset)])
+        yield format_missing_results(dataset, find_reasons_of_refused_reductions(dataset))
+        yield from filter(None, [origin_tables.describe_slow_instability_norms(dataset)])
     elif is_motion(dataset):
         yield summarise_motion(dataset)
         try:
             yield describe_stability(dataset.rsf.scene)
-            yield from note_on_default_friction(dataset.rsf.scene)
+            yield from describe_default_friction(dataset.rsf.scene)
             yield build_events_table(dataset.rsf.events())
         except InvalidValue as error:  # The scene has a user-defined part.
             yield f"stability and events are unavailable: {error}"
@@ -71,7 +71,7 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
 
 
 def build_motion_tables_and_sentences(
-    motion: xr.Dataset, scene: Scene, catalogue: xr.Dataset
+    motion: xr.Dataset, scene: Scene, event_catalogue: xr.Dataset
 ) -> list[SummaryTableOrSentence]:
     """Return the summary of a motion.
 
@@ -90,8 +90,8 @@ def build_motion_tables_and_sentences(
         Peak values of the motion, stability of the scene, a note if the reference friction has its
         default value, and table of the events.
     """
-    notes = [describe_stability(scene), *note_on_default_friction(scene)]
-    return [summarise_motion(motion), *notes, build_events_table(catalogue)]
+    notes = [describe_stability(scene), *describe_default_friction(scene)]
+    return [summarise_motion(motion), *notes, build_events_table(event_catalogue)]
 
 
 def is_motion(dataset: xr.Dataset) -> bool:
@@ -128,7 +128,7 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
         return origin_tables.describe_study_origin(dataset)
     about, scene = dataset.attrs, StoredDataset(dataset).scene_fields
     fields = {n: v for n, v in scene.items() if n not in ("segments", "samples")}
-    rig = StoredDataset(dataset).read_json("laboratory") if "laboratory" in about else {}
+    rig = StoredDataset(dataset).read_json_attribute("laboratory") if "laboratory" in about else {}
     return {
         **origin_tables.describe_scene_and_rig_fields("scene", fields, rig),
         "command": about.get("history", "unknown"),
@@ -137,7 +137,7 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
     }
 
 
-def measure_motion(dataset: xr.Dataset) -> dict[str, Any]:
+def compute_duration_and_peaks_of_motion(dataset: xr.Dataset) -> dict[str, Any]:
     """Compute the duration and the peak values of a motion.
 
     Parameters
@@ -184,7 +184,7 @@ def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
         the end. If a motion without inertia and without radiation damping exceeds the instability
         norm, the dictionary also describes the time at which the slip rate exceeds the norm.
     """
-    found, unit = measure_motion(dataset), format_units(dataset["time"])
+    found, unit = compute_duration_and_peaks_of_motion(dataset), format_units(dataset["time"])
     told = {"duration": f"{found['duration']:.6g} {unit}"}
     for name, units in (("friction", ""), ("slip_rate", f" {found['slip_rate_units']}")):
         peak, time = found[f"peak_{name}"], found[f"peak_{name}_time"]
@@ -214,7 +214,7 @@ def describe_stability(scene: Scene) -> str:
     return f"stiffness is {ratio}: steady sliding at V_* is {sliding}"
 
 
-def note_on_default_friction(scene: Scene) -> list[str]:
+def describe_default_friction(scene: Scene) -> list[str]:
     """Return a note if the friction coefficient at V_* has its default value.
 
     Parameters
@@ -227,7 +227,7 @@ def note_on_default_friction(scene: Scene) -> list[str]:
     list of str
         Note, or an empty list if the friction coefficient differs from the default.
     """
-    default = SceneFields.defaults()["mu_star"]
+    default = SceneFields.collect_defaults()["mu_star"]
     if scene.mu_star != default:
         return []
     return [f"mu_star, the friction coefficient at V_*, has its default value {default:g}"]
@@ -260,7 +260,7 @@ def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:
         heads[name] = words if unit == "1" else f"{words} ({unit})"
     flags = read_flag_meanings(event_catalogue["cut"].attrs) | {0: "-"}
     rows = []
-    for place in range(min(count, MAX_CELLS_SHOWN)):
+    for place in range(min(count, MAX_CELLS_IN_THINNED_TABLE)):
         event = event_catalogue.isel(event=place)
         row = {
             words: format_number_or_dash(float(event[name]), ".4g") for name, words in heads.items()

@@ -12,13 +12,13 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.formatting import format_value, read_flag_meanings
-from rsfstudy.quantities import units_or_scale_of_variable
+from rsfstudy.quantities import read_units_or_scale
 from rsfstudy.vocabulary import find_quantity
 
 #: Maximum number of cells in a table that shows a selection of cells.
-MAX_CELLS_SHOWN = 24
+MAX_CELLS_IN_THINNED_TABLE = 24
 #: Maximum number of significant digits of a float.
-_MAX_DIGITS = 15
+_MAX_SIGNIFICANT_DIGITS = 15
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class TextTable:
     rows: Sequence[Mapping[str, str]]
     caption: str = ""
     wrappable_columns: Collection[str] = ()
-    row_colours: Sequence[str] = ()
-    values: Sequence[Mapping[str, Any]] = ()
+    last_cell_colours: Sequence[str] = ()
+    unformatted_rows: Sequence[Mapping[str, Any]] = ()
 
 
-class Column(NamedTuple):
+class TextTableColumn(NamedTuple):
     """Table column that shows a variable of a dataset.
 
     Parameters
@@ -63,9 +63,9 @@ class Column(NamedTuple):
     """
 
     heading: str
-    variable: str
-    format: Callable[[Any], str]
-    key: str = ""
+    variable_name: str
+    format_function: Callable[[Any], str]
+    unformatted_key: str = ""
 
 
 def format_number_or_dash(value: float, format_specification: str = ".8g") -> str:
@@ -105,7 +105,7 @@ def format_rounded_to_error(value: float, error: float) -> str:
     if not 0.0 < error < abs(value):
         return format_number_or_dash(value)
     digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
-    return format(value, f".{min(digits, _MAX_DIGITS)}g")
+    return format(value, f".{min(digits, _MAX_SIGNIFICANT_DIGITS)}g")
 
 
 def build_single_scene_result_table(dataset: xr.Dataset) -> TextTable:
@@ -139,7 +139,7 @@ def build_single_scene_result_table(dataset: xr.Dataset) -> TextTable:
         rows.append(row)
         number = {"value": flags.get(value, value), "error": error, "units": units}
         numbers.append({"name": str(name), **number, "description": description})
-    return TextTable(rows, wrappable_columns={"description"}, values=numbers)
+    return TextTable(rows, wrappable_columns={"description"}, unformatted_rows=numbers)
 
 
 def format_units(variable: xr.DataArray) -> str:
@@ -156,7 +156,7 @@ def format_units(variable: xr.DataArray) -> str:
         Units of the variable, or the scale by which the variable was divided. The string is "1" if
         the variable is a pure number.
     """
-    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_or_scale_of_variable(variable.attrs) or "1")
+    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", read_units_or_scale(variable.attrs) or "1")
     return re.sub(r" \((\w+)\)-1| (\(.*?\))-1", r"/\1\2", units)
 
 
@@ -181,7 +181,7 @@ def format_axis_name(axis_coordinate: xr.DataArray) -> str:
 def build_table_along_dimensions(
     dataset: xr.Dataset,
     dimensions: Iterable[Hashable],
-    columns: Sequence[Column],
+    columns: Sequence[TextTableColumn],
     caption: str = "",
     wrappable_columns: Collection[str] = (),
 ) -> TextTable:
@@ -208,18 +208,25 @@ def build_table_along_dimensions(
         variables are replaced by their labels.
     """
     dims, rows, values = list(map(str, dimensions)), [], []
-    flags = {column.key: read_flag_meanings(dataset[column.variable].attrs) for column in columns}
+    flags = {
+        column.unformatted_key: read_flag_meanings(dataset[column.variable_name].attrs)
+        for column in columns
+    }
     for at in np.ndindex(*(dataset.sizes[d] for d in dims)):
         one = dataset.isel(dict(zip(dims, at, strict=True)))
-        cells = {column: one[column.variable].item() for column in columns}
+        cells = {column: one[column.variable_name].item() for column in columns}
         rows.append(
             {format_axis_name(one[d]): format_value(one[d].item()) for d in dims}
-            | {column.heading: column.format(value) for column, value in cells.items()}
+            | {column.heading: column.format_function(value) for column, value in cells.items()}
         )
-        fields = {column.variable: value for column, value in cells.items() if not column.key}
+        fields = {
+            column.variable_name: value
+            for column, value in cells.items()
+            if not column.unformatted_key
+        }
         found: dict[str, Any] = {"coordinates": {d: one[d].item() for d in dims} | fields}
         for column, value in cells.items():
-            if column.key:
-                found[column.key] = flags[column.key].get(value, value)
+            if column.unformatted_key:
+                found[column.unformatted_key] = flags[column.unformatted_key].get(value, value)
         values.append(found)
-    return TextTable(rows, caption, wrappable_columns, values=values)
+    return TextTable(rows, caption, wrappable_columns, unformatted_rows=values)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.formatting import pluralize
-from rsfstudy.reporting.cell_tables import count_failures
+from rsfstudy.formatting import format_count_with_noun
+from rsfstudy.reporting.cell_tables import count_failed_cells_by_status
 from rsfstudy.reporting.tables import TextTable
-from rsfstudy.study import Claim, format_verdict_row
+from rsfstudy.study import Claim, format_verdict_row_for_report
 
 
-def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
+def build_claims_table(verdicts: pd.DataFrame) -> TextTable | str:
     """Build a table of claims and their verdicts.
 
     Parameters
@@ -27,21 +27,22 @@ def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
     """
     rows = verdicts.to_dict("records")
     if not any(row["verdict"] != Claim.NOT_APPLICABLE for row in rows):
-        return f"{pluralize(len(rows), 'claim')} not checked: {count_verdicts(verdicts)}" * bool(
-            rows
+        return (
+            f"{format_count_with_noun(len(rows), 'claim')} not checked: {format_verdict_counts(verdicts)}"
+            * bool(rows)
         )
     colours = [
         "red" if row["verdict_changed"] else "green" if row["verdict"] == "reproduced" else "yellow"
         for row in rows
     ]
     return TextTable(
-        [format_verdict_row(row) for row in rows],
+        [format_verdict_row_for_report(row) for row in rows],
         wrappable_columns={"claim", "tolerance and reason"},
-        row_colours=colours,
+        last_cell_colours=colours,
     )
 
 
-def count_verdicts(verdicts: pd.DataFrame) -> str:
+def format_verdict_counts(verdicts: pd.DataFrame) -> str:
     """Count the claims with each verdict.
 
     Parameters
@@ -61,7 +62,9 @@ def count_verdicts(verdicts: pd.DataFrame) -> str:
     return ", ".join(f"{given.count(v)} {v}" for v in Claim.VERDICTS if v in given)
 
 
-def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str, list[str]]:
+def summarise_verdicts_and_failures(
+    dataset: xr.Dataset, verdicts: pd.DataFrame
+) -> tuple[str, list[str]]:
     """Summarise the verdicts of a study, and describe its failed cells.
 
     Parameters
@@ -78,7 +81,7 @@ def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str
     problems : list of str
         Descriptions of failed cells, and of claims whose verdict differs from the expected verdict.
     """
-    wrong = [f"{count} {label}" for label, count in count_failures(dataset).items()]
+    wrong = [f"{count} {label}" for label, count in count_failed_cells_by_status(dataset).items()]
     changed = verdicts["id"][verdicts["verdict_changed"]]
     wrong += [f"verdict of {claim} changed" for claim in dict.fromkeys(changed)]
-    return count_verdicts(verdicts), wrong
+    return format_verdict_counts(verdicts), wrong

@@ -9,7 +9,7 @@ from rsfstudy.slider import (
     LOG_SLIP_RATE_PER_PATH_LENGTH,
     MotionPoint,
     Scene,
-    displacement_per_path_length,
+    compute_displacement_per_path_length,
 )
 
 #: Lower bound of the squared direction cosine of the path. The direction cosine vanishes if ln V
@@ -17,7 +17,9 @@ from rsfstudy.slider import (
 MIN_SQUARED_DIRECTION_COSINE_OF_PATH = 1e-12
 
 
-def distance_from_steady_sliding(scene: Scene, point: MotionPoint, load_velocity: float) -> float:
+def compute_distance_from_steady_sliding(
+    scene: Scene, point: MotionPoint, load_velocity: float
+) -> float:
     """Compute the distance of a point from steady sliding at a load point velocity.
 
     Parameters
@@ -43,7 +45,7 @@ def distance_from_steady_sliding(scene: Scene, point: MotionPoint, load_velocity
     )
 
 
-def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> float:
+def compute_growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> float:
     """Compute the growth rate of ln V at an event with respect to path length.
 
     During a rupture, the independent variable is the path length computed with the inertial time.
@@ -77,7 +79,7 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
         )
         * norm
     )
-    return LOG_SLIP_RATE_PER_PATH_LENGTH * slant * displacement_per_path_length(slant)
+    return LOG_SLIP_RATE_PER_PATH_LENGTH * slant * compute_displacement_per_path_length(slant)
 
 
 def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:

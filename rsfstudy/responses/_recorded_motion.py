@@ -26,7 +26,7 @@ ERROR_FLOOR_OVER_RTOL = 0.01
 #: the requested relative accuracy. Without this minimum, 22 of 7,071 results of random holds have
 #: errors of up to 22 times their estimates. With the minimum, four results have errors of up to 1.7
 #: times their estimates (study ``coverage``).
-_FRICTION_ERROR_FLOOR_OVER_A_AND_RTOL = 0.1
+_FRICTION_ERROR_FLOOR_OVER_A_TIMES_RTOL = 0.1
 
 
 class RecordedMotion(NamedTuple):
@@ -64,7 +64,7 @@ class RecordedMotion(NamedTuple):
         """Event at the beginning of the record."""
         return self.segment_start_events[0]
 
-    def neglected_error_until(self, time: float) -> float:
+    def get_neglected_inertia_error_until(self, time: float) -> float:
         """Return the error of ln V that is caused by neglected inertia.
 
         Parameters
@@ -81,10 +81,10 @@ class RecordedMotion(NamedTuple):
         return float(self.neglected_inertia_error[row])
 
 
-def record_motion_of_segment(
+def record_motion_until_peak(
     scene: Scene,
     integrator: Integrator,
-    specifications: Sequence[EventSpecification],
+    event_specs: Sequence[EventSpecification],
     first_segment: int,
     peak_segment: int,
     *,
@@ -127,15 +127,15 @@ def record_motion_of_segment(
     try:
         for event in integrator.follow(
             scene,
-            specifications,
+            event_specs,
             with_time=True,
             recording=recording,
             until=end_time,
         ):
-            if event.kind in (EventKind.START, EventKind.SEGMENT):
+            if event.kind in (EventKind.START, EventKind.SEGMENT_START):
                 begun.append(event)
             elif (
-                event.specification == specifications[0]
+                event.specification == event_specs[0]
                 and len(begun) == peak_segment + 1
                 and peak is None
             ):
@@ -146,20 +146,20 @@ def record_motion_of_segment(
         if peak is None or not allow_early_stop:
             raise
     rows, start = recording.as_table(scene), Integrator.point_before_start(scene)
-    slow = recording.index_of_regime(scene.dynamics.regime)
+    slow = recording.get_or_add_regime_index(scene.dynamics.regime)
     neglected = estimate_neglected_inertia_error(scene, rows, slow, start.log_slip_rate)
     shown = rows[:, 0] >= begun[first_segment].time
     rows, neglected = rows[shown], neglected[shown]
     # The other samples of the step that ends at the first row are not part of the record.
-    rows[0, Recording.SAMPLE_COLUMN] = 0.0
-    friction, later = Recording.friction_coefficient(rows), begun[max(first_segment, 1) :]
+    rows[0, Recording.SAMPLE_NUMBER_COLUMN] = 0.0
+    friction, later = Recording.get_friction_coefficient(rows), begun[max(first_segment, 1) :]
     before = [float(friction[rows[:, 0] == each.time][0]) for each in later]
     if first_segment == 0:
         before.insert(0, start.apparent_friction)
     return RecordedMotion(begun[first_segment:], before, peak, event, rows, neglected)
 
 
-def path_relative_to_start(
+def compute_path_relative_to_start(
     start_event: Event, path_variables: Mapping[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
     """Return the quantities along a record relative to its beginning.
@@ -230,7 +230,8 @@ def estimate_error_at_instant(
     because friction changes by :math:`a` if :math:`\ln V` changes by 1.
     """
     friction = (
-        integrator.result_tolerance(_FRICTION_ERROR_FLOOR_OVER_A_AND_RTOL) + neglected_inertia_error
+        integrator.result_tolerance(_FRICTION_ERROR_FLOOR_OVER_A_TIMES_RTOL)
+        + neglected_inertia_error
     ) * scene.a
     error = integrator.estimate_error(value, refined_value, ERROR_FLOOR_OVER_RTOL)
     return error + friction * abs(friction_derivative)

@@ -14,9 +14,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
+    check_loading_has_no_noise,
     create_outputs_along_phase,
-    refuse_noise,
-    steady_sliding_is_linearly_stable,
+    is_steady_sliding_linearly_stable,
 )
 from rsfstudy.motion import (
     Event,
@@ -32,14 +32,14 @@ from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
 from rsfstudy.responses._motion_readings import (
     choose_friction_quantity_for_events,
-    distance_from_steady_sliding,
-    growth_rate_along_path,
+    compute_distance_from_steady_sliding,
+    compute_growth_rate_along_path,
 )
 from rsfstudy.responses._recorded_motion import (
     RecordedMotion,
+    compute_path_relative_to_start,
     estimate_errors_at_instants,
-    path_relative_to_start,
-    record_motion_of_segment,
+    record_motion_until_peak,
 )
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
@@ -50,15 +50,15 @@ _MAX_STEADY_STATE_DISTANCE_BEFORE_HOLD = 1e-3
 #: Peaks of friction near steady sliding are attributed to numerical errors if the ratio of their
 #: height to the local tolerance is below this number. In 7,000 random motions with rtol from 1e-2
 #: to 1e-6, the largest ratio of the height of such a peak to the local tolerance is 1.9.
-_FRICTION_NOISE_OVER_LOCAL_TOLERANCE = 3.0
+_MAX_SPURIOUS_PEAK_OVER_LOCAL_TOLERANCE = 3.0
 #: No further peak of friction is expected if the distance from steady sliding is less than this
 #: fraction of the largest distance from steady sliding during the motion.
-_SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-6
+_SETTLED_DISTANCE_OVER_MAX_DISTANCE = 1e-6
 
 _PEAK_DISPLACEMENT_MEANING = "load point displacement from reloading to the peak of friction"
 _HEALING_MEANING = "healing: peak friction on reloading minus friction before the hold"
 _RELAXATION_MEANING = "friction at the end of the hold minus friction before the hold"
-_OUTPUTS = (
+_HEALING_OUTPUTS = (
     Output("healing", r"$\Delta\mu$", "1", _HEALING_MEANING, error=True),
     Output("relaxation", r"$\Delta\mu_c$", "1", _RELAXATION_MEANING, error=True),
     Output(
@@ -132,7 +132,7 @@ class Healing(RecordingMeasure):
     name: ClassVar[str] = "healing"
     primary_output = "healing"
     typical_work = 4_000
-    outputs = _OUTPUTS
+    outputs = _HEALING_OUTPUTS
 
     def __post_init__(self) -> None:
         """Check the fields of the measure."""
@@ -180,7 +180,7 @@ class Healing(RecordingMeasure):
         Outcome
             Status, results and message.
         """
-        refuse_noise(scene)
+        check_loading_has_no_noise(scene)
         hold = _find_first_hold_segment(scene)
         first = _record_hold_and_reloading(scene, hold, integrator)
         said = _describe_unsteady_start_of_hold(
@@ -197,7 +197,7 @@ class Healing(RecordingMeasure):
         if first.peak_event is None:
             if first.last_event.kind is EventKind.SETTLED:
                 # The call raises MotionStopped if the stability is undecided.
-                steady_sliding_is_linearly_stable(scene)
+                is_steady_sliding_linearly_stable(scene)
             return peakless
         again = _record_hold_and_reloading(
             scene,
@@ -214,25 +214,31 @@ class Healing(RecordingMeasure):
         history = scene.parts.loading.segments
         # Friction peaks when the slip rate passes the load point velocity. A change of ln V by 1
         # changes friction by a.
-        growth = growth_rate_along_path(scene, first.peak_event, history[hold + 1].load_velocity)
+        growth = compute_growth_rate_along_path(
+            scene, first.peak_event, history[hold + 1].load_velocity
+        )
         turning = 1.0 / (scene.a * growth) if growth else math.inf
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
-        neglected = dict.fromkeys(values, first.neglected_error_until(first.peak_event.time))
-        neglected["relaxation"] = first.neglected_error_until(first.segment_start_events[1].time)
+        neglected = dict.fromkeys(
+            values, first.get_neglected_inertia_error_until(first.peak_event.time)
+        )
+        neglected["relaxation"] = first.get_neglected_inertia_error_until(
+            first.segment_start_events[1].time
+        )
         # The peak displacement depends on the growth rate of ln V at the peak. The error of the
         # growth rate rises earlier than the error of ln V, so the error at the end of the record is
         # used.
-        neglected["peak_displacement"] = first.neglected_error_until(math.inf)
+        neglected["peak_displacement"] = first.get_neglected_inertia_error_until(math.inf)
         errors = estimate_errors_at_instants(
             values, refined, by_friction, scene, integrator, neglected
         )
         above = again.peak_event.point.apparent_friction - float(
-            Recording.friction_coefficient(again.recorded_rows)[-1]
+            Recording.get_friction_coefficient(again.recorded_rows)[-1]
         )
         # Near steady sliding, friction may have spurious peaks on which both runs agree.
         if above <= max(
             errors["healing_error"],
-            _FRICTION_NOISE_OVER_LOCAL_TOLERANCE * integrator.refined().local_tolerance,
+            _MAX_SPURIOUS_PEAK_OVER_LOCAL_TOLERANCE * integrator.refined().local_tolerance,
         ):
             return peakless
         return Outcome(
@@ -255,10 +261,12 @@ class Healing(RecordingMeasure):
         self, scene: Scene, record: RecordedMotion
     ) -> dict[str, np.ndarray]:
         """Return the quantities recorded since the beginning of the hold, by phase."""
-        path = resample_motion_along_path(record.recorded_rows, self.phases, Recording.VARIABLES)
-        moved = Recording.load_point_displacement(scene, np.column_stack([*path.values()]))
+        path = resample_motion_along_path(
+            record.recorded_rows, self.phases, Recording.VARIABLE_NAMES
+        )
+        moved = Recording.compute_load_point_displacement(scene, np.column_stack([*path.values()]))
         return {
-            **path_relative_to_start(record.start_event, path),
+            **compute_path_relative_to_start(record.start_event, path),
             "load_point_displacement": moved - moved[0],
         }
 
@@ -294,7 +302,7 @@ def _describe_unsteady_start_of_hold(
 ) -> str:
     """Return a message if a hold does not begin in steady sliding."""
     before = (Segment(1.0), *scene.parts.loading.segments)[hold_index]
-    away = distance_from_steady_sliding(scene, hold_start_event.point, before.load_velocity)
+    away = compute_distance_from_steady_sliding(scene, hold_start_event.point, before.load_velocity)
     if away <= tolerance:
         return ""
     return f"the hold does not begin in steady sliding: ln V or state/b differs by {away:.2g}"
@@ -315,11 +323,11 @@ def _record_hold_and_reloading(
     peak, settled = (
         maximum(choose_friction_quantity_for_events(scene)[0]),
         approach_to_steady_state(
-            _SETTLING_TOLERANCE_OVER_MAX_DISTANCE, terminal=end_time == math.inf
+            _SETTLED_DISTANCE_OVER_MAX_DISTANCE, terminal=end_time == math.inf
         ),
     )
     asked = peak, settled
-    return record_motion_of_segment(
+    return record_motion_until_peak(
         scene,
         integrator,
         asked,

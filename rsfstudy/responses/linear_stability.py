@@ -40,7 +40,7 @@ _CRITICAL_STIFFNESS = Output(
     "sigma_*/D_c",
     error=True,
 )
-_OUTPUTS = (
+_STABILITY_OUTPUTS = (
     _CRITICAL_STIFFNESS,
     Output("critical_stiffness_from_growth"),
     Output("critical_stiffness_explicit"),
@@ -134,8 +134,12 @@ class LinearStability(Measure):
     def outputs(self) -> Sequence[Output]:
         """Critical stiffness, properties of steady sliding, and the growth rate if requested."""
         if not self.growth_rate:
-            return _OUTPUTS
-        return (*GROWTH_OUTPUTS, replace(_CRITICAL_STIFFNESS, optional=True), *_OUTPUTS[1:])
+            return _STABILITY_OUTPUTS
+        return (
+            *GROWTH_OUTPUTS,
+            replace(_CRITICAL_STIFFNESS, optional=True),
+            *_STABILITY_OUTPUTS[1:],
+        )
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
@@ -258,7 +262,7 @@ class LinearStability(Measure):
                 "critical_stiffness": critical,
                 "critical_stiffness_error": abs(by_growth - critical) + 1e-15 * critical,
                 "critical_stiffness_from_growth": by_growth,
-                "critical_stiffness_explicit": _closed_form_critical_stiffness(scene)
+                "critical_stiffness_explicit": _compute_closed_form_critical_stiffness(scene)
                 * (1.0 + rise),
                 "relative_critical_stiffness": relative,
                 "rise_by_dynamics": rise,
@@ -267,7 +271,7 @@ class LinearStability(Measure):
         )
 
 
-def _closed_form_critical_stiffness(scene: Scene) -> float:
+def _compute_closed_form_critical_stiffness(scene: Scene) -> float:
     """Compute the critical stiffness from the published formula.
 
     The result is NaN if the formula does not apply to the scene.

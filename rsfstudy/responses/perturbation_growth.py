@@ -13,7 +13,7 @@ import numpy as np
 from rsfstudy.measure_base import Outcome
 from rsfstudy.motion import Integrator
 from rsfstudy.quantities import Output
-from rsfstudy.slider import Equations, Scene, SteadySliding
+from rsfstudy.slider import EquationsOfMotion, Scene, SteadySliding
 from rsfstudy.status import Status
 
 #: Step of the central differences, in units of the scale of an unknown. Rounding and truncation
@@ -128,7 +128,7 @@ def add_growth_rate(
     )
     difference = float(abs(found - leading).min())
     rounding = scene.largest_linear_growth_rate(load)
-    error = difference + (rounding.error if rounding else math.inf)
+    error = difference + (rounding.error_estimate if rounding else math.inf)
     rate = math.exp(load)
     values = {
         **outcome.values,
@@ -165,7 +165,7 @@ def max_growth_rate(jacobian: np.ndarray) -> float:
     return float(np.linalg.eigvals(jacobian).real.max())
 
 
-def compute_jacobian(equations: Equations, unknowns: tuple[float, ...]) -> np.ndarray:
+def compute_jacobian(equations: EquationsOfMotion, unknowns: tuple[float, ...]) -> np.ndarray:
     """Compute the Jacobian of the right-hand side by central differences.
 
     Parameters

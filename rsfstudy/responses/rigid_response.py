@@ -11,7 +11,7 @@ import numpy as np
 
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import Measure, Outcome, refuse_noise
+from rsfstudy.measure_base import Measure, Outcome, check_loading_has_no_noise
 from rsfstudy.motion import EventKind, Integrator, MotionStopped, Recording, fall, rise
 from rsfstudy.quantities import Output
 from rsfstudy.responses._recorded_motion import estimate_error_at_instant
@@ -49,7 +49,7 @@ _STRESS_CHANGE_OUTPUTS = (
         "largest difference from exponential decay over D_c, divided by the stress change",
     ),
 )
-_OUTPUTS = (
+_RIGID_RESPONSE_OUTPUTS = (
     Output("evolution_distance", error=True),
     *(Output(name, "", "1", meaning, scale) for name, scale, meaning in _STRESS_CHANGE_OUTPUTS),
     *(
@@ -122,7 +122,7 @@ class RigidResponse(Measure):
     name: ClassVar[str] = "rigid_response"
     primary_output = "evolution_distance"
     typical_work = 800
-    outputs = _OUTPUTS
+    outputs = _RIGID_RESPONSE_OUTPUTS
     needs_time: ClassVar[tuple[bool, ...]] = ()
 
     def __post_init__(self) -> None:
@@ -177,7 +177,7 @@ class RigidResponse(Measure):
         Outcome
             Status, results and message.
         """
-        refuse_noise(scene)
+        check_loading_has_no_noise(scene)
         log_slip_rate = scene.log_load_velocity
         if log_slip_rate == 0.0:
             return Outcome(Status.NO_STEP, message="the slip rate is V_*, so there is no step")
@@ -190,14 +190,14 @@ class RigidResponse(Measure):
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
         start, steady = (
-            frictional_stress_after_rate_step(scene, log_slip_rate),
+            compute_frictional_stress_after_step(scene, log_slip_rate),
             sliding.frictional_stress,
         )
         if abs(start - steady) < _MIN_FRICTION_EVOLUTION_OVER_A * scene.a:
             return Outcome(Status.NOT_APPLICABLE, message="friction does not evolve after the step")
         level = steady + (start - steady) / math.e
-        distance, left, rows = self._follow_stress_over_slip(scene, start, level, integrator)
-        again, _left, _rows = self._follow_stress_over_slip(
+        distance, left, rows = self._integrate_stress_over_slip(scene, start, level, integrator)
+        again, _left, _rows = self._integrate_stress_over_slip(
             scene, start, level, integrator.refined()
         )
         # Derivative of the distance with respect to friction, for an exponential decay.
@@ -216,7 +216,9 @@ class RigidResponse(Measure):
                 **_compute_step_asymmetries(scene, log_slip_rate),
                 "steady_stress_change": steady,
                 "stress_left_at_unit_slip": left - steady,
-                "closed_form_misfit": _misfit_to_closed_form(scene, steady, slip, rows[:, 0]),
+                "closed_form_misfit": _compute_misfit_to_closed_form(
+                    scene, steady, slip, rows[:, 0]
+                ),
                 "exponential_misfit": float(departs[np.abs(departs).argmax()]),
                 "shear_stress": scene.mu_star + rows[:, 0],
                 "normal_stress_ratio": rows[:, 2],
@@ -224,7 +226,7 @@ class RigidResponse(Measure):
             },
         )
 
-    def _follow_stress_over_slip(
+    def _integrate_stress_over_slip(
         self,
         scene: Scene,
         start_stress: float,
@@ -252,18 +254,18 @@ class RigidResponse(Measure):
         for event in integrator.follow_equations(equations, state, watches, recording=recording):
             if event.specification is not None and math.isnan(distance):
                 distance = event.slip
-            complete = complete or event.kind is EventKind.SAMPLED
+            complete = complete or event.kind is EventKind.ALL_SAMPLES_RECORDED
             if complete and not math.isnan(distance):
                 break
         names = ("slip", "frictional_stress", "state_variable", "normal_stress_ratio")
-        columns = [Recording.VARIABLES.index(name) for name in names]
+        columns = [Recording.VARIABLE_NAMES.index(name) for name in names]
         slips, *values = recording.as_table(scene)[:, columns].T
         values[0] = values[0] - scene.mu_star
         rows = np.stack(values, axis=1)
         return distance, float(rows[slips == 1.0, 0][0]), rows[np.isin(slips, at)]
 
 
-def _misfit_to_closed_form(
+def _compute_misfit_to_closed_form(
     scene: Scene, steady_state: float, slip: np.ndarray, stress: np.ndarray
 ) -> float:
     r"""Compute the largest difference between stress and its closed form.
@@ -297,7 +299,7 @@ def _compute_step_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, f
     if steady is None or inverse_steady is None:
         return {}
     direct, inverse = (
-        frictional_stress_after_rate_step(scene, x) for x in (log_slip_rate, -log_slip_rate)
+        compute_frictional_stress_after_step(scene, x) for x in (log_slip_rate, -log_slip_rate)
     )
     evolves = direct - steady.frictional_stress
     inverse_evolves = inverse - inverse_steady.frictional_stress
@@ -307,7 +309,7 @@ def _compute_step_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, f
     }
 
 
-def frictional_stress_after_rate_step(scene: Scene, log_slip_rate: float) -> float:
+def compute_frictional_stress_after_step(scene: Scene, log_slip_rate: float) -> float:
     """Compute the frictional stress immediately after a slip rate step.
 
     The step changes the slip rate from V_* to V and does not change the state Psi.

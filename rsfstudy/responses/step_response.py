@@ -16,7 +16,7 @@ from rsfstudy.measure_base import (
     RecordingMeasure,
     check_loading_changes_stress_only_in_steps,
     create_outputs_along_phase,
-    steady_sliding_is_linearly_stable,
+    is_steady_sliding_linearly_stable,
 )
 from rsfstudy.motion import (
     Event,
@@ -37,9 +37,9 @@ LN10 = math.log(10.0)
 
 #: An oscillation has ended if the distance from steady sliding is less than this fraction of the
 #: largest distance from steady sliding during the motion.
-_SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-3
+_SETTLED_DISTANCE_OVER_MAX_DISTANCE = 1e-3
 
-_OUTPUTS = (
+_STEP_RESPONSE_OUTPUTS = (
     Output("max_log10_slip_rate", error=True),
     Output(
         "peak_ratio",
@@ -47,7 +47,7 @@ _OUTPUTS = (
         "repeats itself",
     ),
     Output("peak_log10_slip_rate", dims=("peak",)),
-    *create_outputs_along_phase(*Recording.MOTION_VARIABLES),
+    *create_outputs_along_phase(*Recording.MOTION_VARIABLE_NAMES),
 )
 
 
@@ -113,7 +113,7 @@ class StepResponse(RecordingMeasure):
     name: ClassVar[str] = "step_response"
     primary_output = "max_log10_slip_rate"
     typical_work = 10_000
-    outputs = _OUTPUTS
+    outputs = _STEP_RESPONSE_OUTPUTS
     dimensions = (Quantity("peak", "", "1", "number of the peak of slip rate after the step"),)
 
     def __post_init__(self) -> None:
@@ -171,8 +171,8 @@ class StepResponse(RecordingMeasure):
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         if not scene.is_perturbed:
             return Outcome(Status.NO_STEP, message="V_0 is equal to V_*, so there is no step")
-        peaks, rows = self._follow_and_record_oscillations(scene, integrator)
-        again, _rows = self._follow_and_record_oscillations(scene, integrator.refined())
+        peaks, rows = self._integrate_and_record_oscillations(scene, integrator)
+        again, _rows = self._integrate_and_record_oscillations(scene, integrator.refined())
         heights = peaks - scene.log_load_velocity / LN10
         log_slip_rates = np.full(self.peaks, np.nan)
         log_slip_rates[: len(peaks)] = peaks
@@ -183,14 +183,14 @@ class StepResponse(RecordingMeasure):
                 "max_log10_slip_rate_error": integrator.estimate_error(
                     peaks.max(), again.max(), ERROR_FLOOR_OVER_RTOL
                 )
-                + _error_of_neglected_initial_rise(scene, integrator),
+                + _compute_error_of_neglected_initial_rise(scene, integrator),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
                 "peak_log10_slip_rate": log_slip_rates,
                 **resample_motion_along_path(rows, self.phases),
             },
         )
 
-    def _follow_and_record_oscillations(
+    def _integrate_and_record_oscillations(
         self, scene: Scene, integrator: Integrator
     ) -> tuple[np.ndarray, np.ndarray]:
         """Integrate the motion, and return its peaks and the record."""
@@ -199,13 +199,13 @@ class StepResponse(RecordingMeasure):
             Recording(),
             (
                 maximum("log_slip_rate"),
-                approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE),
+                approach_to_steady_state(_SETTLED_DISTANCE_OVER_MAX_DISTANCE),
             ),
         )
         for event in integrator.follow(scene, asked, with_time=True, recording=recording):
-            if event.kind is EventKind.MAXIMUM or _slip_rate_peaks_at_start(scene, event):
+            if event.kind is EventKind.MAXIMUM or _does_slip_rate_peak_at_start(scene, event):
                 peaks.append(event.point.log_slip_rate / LN10)
-            settles = event.kind is EventKind.SETTLED and steady_sliding_is_linearly_stable(scene)
+            settles = event.kind is EventKind.SETTLED and is_steady_sliding_linearly_stable(scene)
             if settles and not peaks:
                 text = (
                     "the slip rate has no maximum, because it approaches the load point "
@@ -217,7 +217,7 @@ class StepResponse(RecordingMeasure):
         raise AssertionError("a motion without a time limit cannot end")
 
 
-def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
+def _does_slip_rate_peak_at_start(scene: Scene, event: Event) -> bool:
     """Return True if the motion starts with a maximum of slip rate.
 
     If the scene has inertia, the slip rate may rise within the inertial time after the step. If the
@@ -230,13 +230,13 @@ def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
     )
 
 
-def _error_of_neglected_initial_rise(scene: Scene, integrator: Integrator) -> float:
+def _compute_error_of_neglected_initial_rise(scene: Scene, integrator: Integrator) -> float:
     """Return the error of log10(V/V_*) caused by an initial rise of slip rate.
 
     The error is zero unless inertia delays the initial rise of slip rate.
     """
     slip = (
-        integrator.accuracy.max_remaining_slip
+        integrator.accuracy.max_slip_in_return_to_slow_manifold
         if _does_inertia_delay_initial_slip_rate_rise(scene)
         else 0.0
     )

@@ -32,14 +32,14 @@ from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
 from rsfstudy.responses._motion_readings import (
     choose_friction_quantity_for_events,
-    distance_from_steady_sliding,
+    compute_distance_from_steady_sliding,
 )
 from rsfstudy.responses._recorded_motion import (
     RecordedMotion,
+    compute_path_relative_to_start,
     compute_settled_friction_flag,
     estimate_errors_at_instants,
-    path_relative_to_start,
-    record_motion_of_segment,
+    record_motion_until_peak,
 )
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
@@ -50,7 +50,7 @@ from rsfstudy.status import Status
 _SETTLING_WINDOW_FRACTION, _SETTLING_TOLERANCE = 0.1, 0.01
 #: Largest permitted distance from steady sliding before the step, divided by the logarithm of the
 #: velocity ratio of the step.
-_MAX_STEADY_DISTANCE_OVER_LOG_RATIO = 1e-3
+_MAX_UNSTEADINESS_OVER_LOG_VELOCITY_STEP = 1e-3
 
 #: Results of the measure, with symbols, scales and meanings.
 _APPARENT_PARAMETER_OUTPUTS = (
@@ -73,7 +73,7 @@ _APPARENT_PARAMETER_OUTPUTS = (
     ("friction_before", r"$\mu$", "", "friction coefficient just before the step"),
     ("friction_after", r"$\mu$", "", "friction coefficient at the end of the record"),
 )
-_OUTPUTS = (
+_VELOCITY_STEP_OUTPUTS = (
     *(
         Output(name, symbol, "1", meaning, scale, error=True)
         for name, symbol, scale, meaning in _APPARENT_PARAMETER_OUTPUTS
@@ -197,7 +197,7 @@ class VelocityStep(RecordingMeasure):
     name: ClassVar[str] = "velocity_step"
     primary_output = "apparent_a_minus_b"
     typical_work = 8_000
-    outputs = _OUTPUTS
+    outputs = _VELOCITY_STEP_OUTPUTS
 
     def __post_init__(self) -> None:
         """Check the fields of the measure."""
@@ -276,7 +276,9 @@ class VelocityStep(RecordingMeasure):
         ]
         (record, values), (_again, again) = records
         slopes = self._compute_output_derivatives_by_friction(step.log_velocity_ratio, values)
-        neglected = dict.fromkeys(slopes, record.neglected_error_until(record.last_event.time))
+        neglected = dict.fromkeys(
+            slopes, record.get_neglected_inertia_error_until(record.last_event.time)
+        )
         errors = estimate_errors_at_instants(values, again, slopes, scene, integrator, neglected)
         found = {**values, **errors, **self._compute_outputs_along_record(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
@@ -320,7 +322,7 @@ class VelocityStep(RecordingMeasure):
         extreme = maximum if evaluated_step.log_velocity_ratio > 0.0 else minimum
         number, end = self.step_number - 1, evaluated_step.start_time + evaluated_step.duration
         turn = extreme(choose_friction_quantity_for_events(scene)[0])
-        record = record_motion_of_segment(scene, integrator, [turn], number, number, end_time=end)
+        record = record_motion_until_peak(scene, integrator, [turn], number, number, end_time=end)
         return record, self._read_step_results(
             evaluated_step, record, self._find_decay_event(scene, record, integrator)
         )
@@ -390,22 +392,22 @@ class VelocityStep(RecordingMeasure):
         """Return the record, ``settled`` and the closed-form departure."""
         rows, friction = (
             recorded_motion.recorded_rows,
-            Recording.friction_coefficient(recorded_motion.recorded_rows),
+            Recording.get_friction_coefficient(recorded_motion.recorded_rows),
         )
         late = recorded_motion.last_event.time - _SETTLING_WINDOW_FRACTION * evaluated_step.duration
         # The last tenth of the record may contain few samples, because time steps may be long.
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
         turned = recorded_motion.peak_event or recorded_motion.last_event
         direct = turned.point.apparent_friction - recorded_motion.friction_before_segments[0]
-        path = path_relative_to_start(
+        path = compute_path_relative_to_start(
             recorded_motion.start_event,
-            resample_motion_along_path(rows, self.phases, Recording.VARIABLES),
+            resample_motion_along_path(rows, self.phases, Recording.VARIABLE_NAMES),
         )
         stepped = scene.segment_scene(self.step_number - 1)
         is_flat = bool(np.ptp(last) < _SETTLING_TOLERANCE * abs(direct))
         return {
             "settled": compute_settled_friction_flag(stepped, is_flat=is_flat),
-            "closed_form_departure": _max_departure_from_closed_form(
+            "closed_form_departure": _compute_max_departure_from_closed_form(
                 scene, evaluated_step, recorded_motion
             ),
             "load_point_displacement": evaluated_step.velocity_after * path.pop("time"),
@@ -413,7 +415,7 @@ class VelocityStep(RecordingMeasure):
         }
 
 
-def _max_departure_from_closed_form(
+def _compute_max_departure_from_closed_form(
     scene: Scene, evaluated_step: _EvaluatedVelocityStep, recorded_motion: RecordedMotion
 ) -> float:
     """Compute the largest difference from the friction of a rigid slider.
@@ -425,7 +427,7 @@ def _max_departure_from_closed_form(
     if (
         relaxation is None
         or recorded_motion.peak_event is None
-        or not _closed_form_applies(scene, evaluated_step, recorded_motion)
+        or not _is_closed_form_applicable(scene, evaluated_step, recorded_motion)
     ):
         return math.nan
     before, after = (
@@ -436,7 +438,7 @@ def _max_departure_from_closed_form(
         before
     )
     steady += scene.dynamics.radiated_stress(after) - scene.dynamics.radiated_stress(before)
-    slip = recorded_motion.recorded_rows[:, Recording.MOTION_VARIABLES.index("slip")]
+    slip = recorded_motion.recorded_rows[:, Recording.MOTION_VARIABLE_NAMES.index("slip")]
     later = recorded_motion.recorded_rows[:, 0] >= recorded_motion.peak_event.time
     left = np.array(
         [
@@ -446,13 +448,13 @@ def _max_departure_from_closed_form(
     )
     expected = steady + scene.b * left
     seen = (
-        Recording.friction_coefficient(recorded_motion.recorded_rows)
+        Recording.get_friction_coefficient(recorded_motion.recorded_rows)
         - recorded_motion.friction_before_segments[0]
     )[later]
     return float(np.abs(seen - expected).max())
 
 
-def _closed_form_applies(
+def _is_closed_form_applicable(
     scene: Scene, evaluated_step: _EvaluatedVelocityStep, recorded_motion: RecordedMotion
 ) -> bool:
     """Return True if the closed form of a rigid slider applies.
@@ -467,6 +469,6 @@ def _closed_form_applies(
         return False
     if not law.scale_free and evaluated_step.velocity_before != 1.0:
         return False
-    return distance_from_steady_sliding(
+    return compute_distance_from_steady_sliding(
         scene, recorded_motion.start_event.point, evaluated_step.velocity_before
-    ) < _MAX_STEADY_DISTANCE_OVER_LOG_RATIO * abs(evaluated_step.log_velocity_ratio)
+    ) < _MAX_UNSTEADINESS_OVER_LOG_VELOCITY_STEP * abs(evaluated_step.log_velocity_ratio)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.rig.column_reading import ColumnsOfSource, ReadingOptions, read_columns
+    from rsfstudy.rig.column_reading import ColumnsReadFromSource, ReadingOptions, read_columns
     from rsfstudy.rig.columns import Column
     from rsfstudy.rig.dataset_units import DatasetUnits
     from rsfstudy.rig.protocol_files import read_protocol
@@ -67,7 +67,7 @@ __all__ = [
     "DatasetUnits",
     "RigAxes",
     "Column",
-    "ColumnsOfSource",
+    "ColumnsReadFromSource",
     "ReadingOptions",
     "Rig",
     "UsableColumns",

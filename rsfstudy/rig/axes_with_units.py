@@ -9,16 +9,16 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from rsfstudy.axes import Axis, AxisRow
+from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
-from rsfstudy.quantities import is_variable_name
+from rsfstudy.quantities import is_valid_variable_name
 from rsfstudy.rig.ranges import expand_range
 from rsfstudy.rig.rig_quantities import (
-    AXIS_NAME_BY_RIG_NAME,
+    AXIS_NAME_BY_RIG_QUANTITY,
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
-    RIG_NAME_BY_AXIS_NAME,
     RIG_QUANTITIES,
+    RIG_QUANTITY_BY_AXIS_NAME,
     SI_UNIT_BY_SCALE,
     find_si_units_of_field,
     is_stiffness_over_normal_stress,
@@ -66,12 +66,12 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
     normal stress is named ``sigma_star``. An axis of velocities with units is named without the
     suffix ``_ratio``.
     """
-    if not is_variable_name(dimension):
+    if not is_valid_variable_name(dimension):
         # The constructor raises an error that explains the rule for names.
         return Axis(dimension, values)
     if hasattr(values, "keys"):
         if isinstance(values, Mapping) and any(
-            isinstance(Axis.fields_of_point(point), Mapping) for point in values.values()
+            isinstance(Axis.get_fields_of_point(point), Mapping) for point in values.values()
         ):
             return convert_axis_to_stated_units(Axis(dimension, values))
         stated: Any = units or None
@@ -82,7 +82,7 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
     listed = [values] if isinstance(values, str) else values
     if not is_sequence_of_axis_values(listed) or not len(listed):
         return Axis(dimension, values)
-    return _single_field_axis([{dimension: value} for value in listed], {dimension: units})
+    return _create_single_field_axis([{dimension: value} for value in listed], {dimension: units})
 
 
 def convert_axis_to_stated_units(axis: Axis) -> Axis:
@@ -99,15 +99,17 @@ def convert_axis_to_stated_units(axis: Axis) -> Axis:
     Axis
         Axis with floats in the units of the axis.
     """
-    if axis.is_single_field:
-        return _single_field_axis(axis.rows, axis.units)
+    if axis.varies_single_field:
+        return _create_single_field_axis(axis.rows, axis.units)
     rows, units = _convert_rows_to_axis_units(
         axis.rows, axis.units, first_value_sets_units=axis.has_numbered_points
     )
     return axis.with_rows(rows, units, axis.sampling_info)
 
 
-def _single_field_axis(rows: Sequence[AxisRow], units: Mapping[str, str]) -> Axis:
+def _create_single_field_axis(
+    rows: Sequence[AxisPointFieldValues], units: Mapping[str, str]
+) -> Axis:
     """Create an axis with units for a single field."""
     found, stated = _convert_rows_to_axis_units(rows, units, first_value_sets_units=True)
     (name,) = found[0]
@@ -115,7 +117,7 @@ def _single_field_axis(rows: Sequence[AxisRow], units: Mapping[str, str]) -> Axi
 
 
 def _convert_rows_to_axis_units(
-    rows: Sequence[AxisRow], units: Mapping[str, str], *, first_value_sets_units: bool
+    rows: Sequence[AxisPointFieldValues], units: Mapping[str, str], *, first_value_sets_units: bool
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """Convert the rows of an axis to numbers and return their units.
 
@@ -128,14 +130,14 @@ def _convert_rows_to_axis_units(
     for row, new in zip(rows, found, strict=True):
         for given, value in row.items():
             example = rows[0][given] if first_value_sets_units else value
-            name, si = axis_name_and_units(given, example)
+            name, si = find_axis_name_and_si_units(given, example)
             new[name if si else given] = value
             if si:
                 quantities.setdefault(name, []).append((new, value))
                 ours = _parse_units_of_value(value) if first_value_sets_units else ""
                 stated.setdefault(name, units.get(given) or ours or si)
             elif units.get(given):
-                factor_to_si(given, units[given])  # This call always raises an error.
+                compute_factor_to_si(given, units[given])  # This call always raises an error.
     for name, held in quantities.items():
         numbers = convert_values_to_units(name, [value for _row, value in held], stated[name])
         for (row, _value), number in zip(held, numbers, strict=True):
@@ -166,11 +168,11 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
         If a value is not a quantity, if its units are incompatible, or if a rig quantity is not
         positive.
     """
-    scale, found = factor_to_si(quantity_name, units), []
+    scale, found = compute_factor_to_si(quantity_name, units), []
     kind = (
         "1/m"
         if quantity_name == "stiffness" and is_stiffness_over_normal_stress(f"1 {units}")
-        else _axis_si_units(quantity_name, "1")
+        else _find_axis_si_units(quantity_name, "1")
     )
     for value in values:
         number, written = (
@@ -185,7 +187,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     wrong = [
         value
         for number, value in zip(found, values, strict=True)
-        if not _is_allowed_rig_number(quantity_name, number)
+        if not _is_positive_if_rig_quantity(quantity_name, number)
     ]
     if wrong:
         of = f", but {len(wrong)} of {len(found)} values are not" if len(found) > 1 else ""
@@ -193,14 +195,14 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     return found
 
 
-def _is_allowed_rig_number(quantity_name: str, number: Any) -> bool:
+def _is_positive_if_rig_quantity(quantity_name: str, number: Any) -> bool:
     """Return False if a quantity that must be positive is not positive."""
-    return quantity_name not in RIG_NAME_BY_AXIS_NAME or (
+    return quantity_name not in RIG_QUANTITY_BY_AXIS_NAME or (
         isinstance(number, float) and number > 0.0
     )
 
 
-def axis_name_and_units(name: str, value: Any) -> tuple[str, str | None]:
+def find_axis_name_and_si_units(name: str, value: Any) -> tuple[str, str | None]:
     """Return the axis name and the SI units of a quantity or field.
 
     Parameters
@@ -217,16 +219,16 @@ def axis_name_and_units(name: str, value: Any) -> tuple[str, str | None]:
     units : str or None
         SI units, or None if the value has no units.
     """
-    name = _axis_field_name(name, value)
-    return name, _axis_si_units(name, value)
+    name = _find_axis_name(name, value)
+    return name, _find_axis_si_units(name, value)
 
 
-def _axis_field_name(name: str, value: Any) -> str:
+def _find_axis_name(name: str, value: Any) -> str:
     """Return the name of the axis that varies a rig quantity or scene field."""
     quantity = not isinstance(value, str) or split_number_and_units(value)[0] is not None
-    if name in AXIS_NAME_BY_RIG_NAME and quantity:
-        return AXIS_NAME_BY_RIG_NAME[name]
-    if not is_variable_name(name):
+    if name in AXIS_NAME_BY_RIG_QUANTITY and quantity:
+        return AXIS_NAME_BY_RIG_QUANTITY[name]
+    if not is_valid_variable_name(name):
         return name  # The scene raises an error later.
     short = name.removesuffix("_ratio")
     return (
@@ -237,12 +239,12 @@ def _axis_field_name(name: str, value: Any) -> str:
     )
 
 
-def _axis_si_units(name: str, value: Any) -> str | None:
+def _find_axis_si_units(name: str, value: Any) -> str | None:
     """Return the SI units of an axis value, or None if it has no units."""
     if value is None or isinstance(value, bool):
         return None
-    if name in RIG_NAME_BY_AXIS_NAME:
-        return RIG_QUANTITIES[RIG_NAME_BY_AXIS_NAME[name]].si_units
+    if name in RIG_QUANTITY_BY_AXIS_NAME:
+        return RIG_QUANTITIES[RIG_QUANTITY_BY_AXIS_NAME[name]].si_units
     if name in RATIO_FIELD_BY_DIMENSIONAL_NAME:
         return SI_UNIT_BY_SCALE["V_*"]
     return find_si_units_of_field(name, value)
@@ -252,7 +254,7 @@ def _parse_units_of_value(value: Any) -> str:
     return split_number_and_units(value)[1] if isinstance(value, str) else ""
 
 
-def factor_to_si(quantity_name: str, units: str) -> Fraction:
+def compute_factor_to_si(quantity_name: str, units: str) -> Fraction:
     """Compute the factor that converts a unit to SI units.
 
     Parameters
@@ -275,7 +277,7 @@ def factor_to_si(quantity_name: str, units: str) -> Fraction:
     """
     if quantity_name == "stiffness" and is_stiffness_over_normal_stress(f"1 {units}"):
         return compute_conversion_factor(quantity_name, units, "1/m")
-    si = _axis_si_units(quantity_name, f"1 {units}")
+    si = _find_axis_si_units(quantity_name, f"1 {units}")
     if si is None:
         raise InvalidValue(quantity_name, units, "are not units of a rig quantity")
     return compute_conversion_factor(quantity_name, units, si)

@@ -13,16 +13,24 @@ from typing import Any, NamedTuple
 
 from rsfstudy.errors import CallError, InvalidValue, shorten_text
 from rsfstudy.rig.columns import Column
-from rsfstudy.rig.readers import read_source
-from rsfstudy.rig.readers.source import Table
+from rsfstudy.rig.readers import read_table_from_source
+from rsfstudy.rig.readers.source import SourceTable
 from rsfstudy.rig.row_selection import RowSelection
-from rsfstudy.rig.units import compute_conversion_factor, convert_to_si, find_size_of_units
-from rsfstudy.rig.usual_headings import UsableColumns, check_finite, read_selected_columns
+from rsfstudy.rig.units import (
+    compute_conversion_factor,
+    convert_to_si,
+    find_si_factor_and_exponents,
+)
+from rsfstudy.rig.usual_headings import (
+    UsableColumns,
+    check_column_values_are_finite,
+    read_selected_columns,
+)
 
 #: Exponents of the base units in a unit of force (see the module ``units``).
-_EXPONENTS_OF_FORCE = (1, 1, -2, 0, 0)
+_BASE_UNIT_EXPONENTS_OF_FORCE = (1, 1, -2, 0, 0)
 #: Columns that may contain a force instead of a stress.
-_STRESS_COLUMNS = ("shear_stress", "normal_stress")
+_COLUMNS_THAT_MAY_CONTAIN_FORCES = ("shear_stress", "normal_stress")
 
 
 @dataclass(frozen=True)
@@ -46,7 +54,7 @@ class ReadingOptions(RowSelection):
     area: Any = None
 
     @classmethod
-    def parse(cls, function_name: str, keywords: Mapping[str, Any]) -> ReadingOptions:
+    def from_keywords(cls, function_name: str, keywords: Mapping[str, Any]) -> ReadingOptions:
         """Create the options from the keyword arguments of a function.
 
         Parameters
@@ -80,7 +88,7 @@ class ReadingOptions(RowSelection):
         return cls(**keywords)
 
 
-class ColumnsOfSource(NamedTuple):
+class ColumnsReadFromSource(NamedTuple):
     """Selected columns of a source, with their table.
 
     Parameters
@@ -94,16 +102,16 @@ class ColumnsOfSource(NamedTuple):
     """
 
     columns: dict[str, Column]
-    table: Table
-    processing: list[str]
+    table: SourceTable
+    row_selection_descriptions: list[str]
 
 
 def read_columns(
     source: Any,
     selected_columns: Mapping[str, Any] | None,
-    usable: UsableColumns,
-    options: ReadingOptions,
-) -> ColumnsOfSource:
+    usable_columns: UsableColumns,
+    reading_options: ReadingOptions,
+) -> ColumnsReadFromSource:
     """Read those columns of a source that the calling function can use.
 
     Parameters
@@ -129,29 +137,38 @@ def read_columns(
     InvalidValue
         If a column is unknown or has no units, or if a value is not a finite number.
     """
-    table = read_source(source, decimal=options.decimal, sheet=options.sheet)
-    found = read_selected_columns(table, selected_columns, usable)
-    found = {name: _convert_force(name, column, options.area) for name, column in found.items()}
+    table = read_table_from_source(
+        source, decimal_separator=reading_options.decimal, sheet_or_group_name=reading_options.sheet
+    )
+    found = read_selected_columns(table, selected_columns, usable_columns)
+    found = {
+        name: _convert_force_to_stress(name, column, reading_options.area)
+        for name, column in found.items()
+    }
     processing: list[str] = []
     if found:
-        found, processing = options.cut(found)
-    check_finite(found)
-    return ColumnsOfSource(found, table, processing)
+        found, processing = reading_options.keep_selected_rows(found)
+    check_column_values_are_finite(found)
+    return ColumnsReadFromSource(found, table, processing)
 
 
-def _convert_force(name: str, column: Column, area: Any) -> Column:
+def _convert_force_to_stress(column_name: str, column: Column, fault_area: Any) -> Column:
     """Divide a force by the area of the fault."""
-    size = find_size_of_units(column.units)
-    if name not in _STRESS_COLUMNS or size is None or size[1] != _EXPONENTS_OF_FORCE:
+    size = find_si_factor_and_exponents(column.units)
+    if (
+        column_name not in _COLUMNS_THAT_MAY_CONTAIN_FORCES
+        or size is None
+        or size[1] != _BASE_UNIT_EXPONENTS_OF_FORCE
+    ):
         return column
-    if area is None:
+    if fault_area is None:
         rule = "must be a stress, not a force"
         remedy = (
             "Pass the fault area, by which the force is divided: area='25 cm2' (--area '25 cm2')."
         )
-        raise InvalidValue(name, column.units, rule, remedy=remedy)
-    square_metres = convert_to_si("area", area, "m2")
+        raise InvalidValue(column_name, column.units, rule, remedy=remedy)
+    square_metres = convert_to_si("area", fault_area, "m2")
     if not square_metres > 0.0:
-        raise InvalidValue("area", area, "must be positive")
-    newtons = float(compute_conversion_factor(name, column.units, "kg m s-2"))
+        raise InvalidValue("area", fault_area, "must be positive")
+    newtons = float(compute_conversion_factor(column_name, column.units, "kg m s-2"))
     return column._replace(values=column.values * (newtons / square_metres), units="Pa")

@@ -28,7 +28,7 @@ HEADING_PATTERN = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
 _MAX_HEADING_LENGTH = 200
 
 
-class ColumnSpec(NamedTuple):
+class ColumnSelection(NamedTuple):
     """Selection of a column in a file.
 
     Parameters
@@ -45,7 +45,7 @@ class ColumnSpec(NamedTuple):
 
     heading: str
     units: str = ""
-    scale: float = 1.0
+    scale_factor: float = 1.0
     offset: float = 0.0
 
 
@@ -95,7 +95,7 @@ def check_heading_lengths(headings: Iterable[str], file_description: str) -> Non
             raise error.with_location(f"{file_description}, column {column}") from error
 
 
-def _parse_column_spec_given_as_list(column_choice: Any) -> ColumnSpec:
+def _parse_column_selection_sequence(column_choice: Any) -> ColumnSelection:
     """Parse a column selection with heading, units, scale and offset."""
     rule = "must be a heading, or a list with a heading, units, a scale and an offset"
     remedy = "Write, for example, ('Time (s)', 's', 0.001)."
@@ -104,7 +104,7 @@ def _parse_column_spec_given_as_list(column_choice: Any) -> ColumnSpec:
         column_choice.tolist() if isinstance(column_choice, np.ndarray) else column_choice
     )
     if not isinstance(column_choice, Sequence) or not 1 <= len(column_choice) <= len(
-        ColumnSpec._fields
+        ColumnSelection._fields
     ):
         raise wrong
     heading, units, *numbers = (*column_choice, "")[: max(2, len(column_choice))]
@@ -113,12 +113,12 @@ def _parse_column_spec_given_as_list(column_choice: Any) -> ColumnSpec:
         raise wrong
     check_heading_length(str(heading))
     try:
-        return ColumnSpec(str(heading), units, *map(float, numbers))
+        return ColumnSelection(str(heading), units, *map(float, numbers))
     except (TypeError, ValueError, OverflowError) as error:
         raise wrong from error
 
 
-def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSpec:
+def parse_column_selection(column_choice: Any, headings: Collection[str]) -> ColumnSelection:
     """Parse the selection of a column.
 
     Parameters
@@ -141,7 +141,7 @@ def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSp
         If the selection is neither a string nor a sequence, or if the heading is too long.
     """
     if not isinstance(column_choice, str):
-        return _parse_column_spec_given_as_list(column_choice)
+        return _parse_column_selection_sequence(column_choice)
     check_heading_length(column_choice)
     raw = (
         None
@@ -155,7 +155,7 @@ def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSp
     match = HEADING_PATTERN.fullmatch(column_choice)
     units = (match[2] or "").strip() if match else ""
     heading = column_choice if column_choice in headings or not match else match[1]
-    return ColumnSpec(heading, units, scale, offset)
+    return ColumnSelection(heading, units, scale, offset)
 
 
 @add_former_member_names
@@ -178,11 +178,11 @@ class Column(NamedTuple):
 
     values: np.ndarray
     units: str
-    column_number: int = 0
+    one_based_column_number: int = 0
     line_numbers: np.ndarray = np.empty(0, dtype=int)
     path: str = ""
 
-    def location(self, row: int) -> str:
+    def format_location_of_row(self, row_index: int) -> str:
         """Return the location of a value for error messages.
 
         Parameters
@@ -196,10 +196,12 @@ class Column(NamedTuple):
             File, line and column of the value, or the number of the sample.
         """
         if not self.path:
-            return f"sample {row + 1}"
-        return f"{self.path}, line {self.line_numbers[row]}, column {self.column_number}"
+            return f"sample {row_index + 1}"
+        return f"{self.path}, line {self.line_numbers[row_index]}, column {self.one_based_column_number}"
 
-    def check_values(self, quantity_name: str, invalid_mask: np.ndarray, rule: str) -> None:
+    def raise_for_invalid_values(
+        self, quantity_name: str, invalid_mask: np.ndarray, rule: str
+    ) -> None:
         """Raise an error for the first invalid value.
 
         Parameters
@@ -219,5 +221,5 @@ class Column(NamedTuple):
         if invalid_mask.any():
             row = int(np.argmax(invalid_mask))
             raise InvalidValue(quantity_name, float(self.values[row]), rule).with_location(
-                self.location(row)
+                self.format_location_of_row(row)
             )

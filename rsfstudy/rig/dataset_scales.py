@@ -44,7 +44,7 @@ NAME_OF_SCALES_ATTRIBUTE = "scales"
 
 #: Relative tolerance for the comparison of two scales. The tolerance allows for rounding errors and
 #: for the limited number of digits of printed scales.
-_RTOL_OF_EQUAL_REFERENCE_RATES = 1e-9
+_RTOL_FOR_COMPARING_SCALES = 1e-9
 
 
 class UnitScale(NamedTuple):
@@ -96,15 +96,15 @@ def read_si_scales(
         If a scale is missing, or if an argument contradicts the dataset.
     """
     return build_si_scales(
-        _resolve_scale_of_dataset(dataset, "sigma_star", "normal_stress", normal_stress, "Pa"),
-        _resolve_scale_of_dataset(dataset, "slip_distance", "slip_distance", slip_distance, "m"),
-        _resolve_scale_of_dataset(
+        _read_scale_or_use_argument(dataset, "sigma_star", "normal_stress", normal_stress, "Pa"),
+        _read_scale_or_use_argument(dataset, "slip_distance", "slip_distance", slip_distance, "m"),
+        _read_scale_or_use_argument(
             dataset, "reference_rate", "reference_rate", reference_rate, "1/s"
         ),
     )
 
 
-def _resolve_scale_of_dataset(
+def _read_scale_or_use_argument(
     dataset: xr.Dataset,
     coordinate_name: str,
     argument_name: str,
@@ -130,7 +130,7 @@ def _resolve_scale_of_dataset(
     if known.size == 1:
         held = xr.Variable((), known[0])
     if stated_value is not None and not np.allclose(
-        held, stated_value, rtol=_RTOL_OF_EQUAL_REFERENCE_RATES, atol=0.0
+        held, stated_value, rtol=_RTOL_FOR_COMPARING_SCALES, atol=0.0
     ):
         rule = f"differs from the value in the dataset, {_format_number_or_range(held)} {units}"
         remedy = (
@@ -192,7 +192,7 @@ def convert_dataset_units(
     size["V_*"] = size["D_c"] / size["D_c/V_*"]
     size["sigma_*/D_c"] = size["sigma_*"] / size["D_c"]
     size["V_*/D_c"] = 1.0 / size["D_c/V_*"]
-    return convert_dataset_by_unit_scales(
+    return multiply_variables_by_unit_scales(
         dataset, {n: UnitScale(s.factor / size[n], units[n]) for n, s in si_scales.items()}
     )
 
@@ -321,7 +321,7 @@ def has_units_unexpected_by_its_figures(dataset: xr.Dataset) -> bool:
     return bool(told) and not as_shown
 
 
-def convert_dataset_by_unit_scales(
+def multiply_variables_by_unit_scales(
     dataset: xr.Dataset, scales_by_name: Mapping[str, UnitScale]
 ) -> xr.Dataset:
     """Multiply all variables of a dataset by their scales.

@@ -21,19 +21,21 @@ class DatasetUnits:
     """
 
     #: Name of the dataset attribute that lists the scales after a conversion.
-    SCALES_ATTRIBUTE: ClassVar[str] = dataset_scales.NAME_OF_SCALES_ATTRIBUTE
+    SCALES_ATTRIBUTE_NAME: ClassVar[str] = dataset_scales.NAME_OF_SCALES_ATTRIBUTE
     #: Units of stress, length and time in tables and figures of rigs.
     DISPLAY_UNITS: ClassVar[Mapping[str, str]] = dataset_scales.DISPLAY_BASE_UNITS
     #: Prefix of the name of a dimensionless field if an axis in physical units has the same name.
     DIMENSIONLESS_PREFIX: ClassVar[str] = dataset_scales.DIMENSIONLESS_PREFIX
 
-    dimensional_name = staticmethod(dataset_scales.convert_to_dimensional_name)
+    convert_to_dimensional_name = staticmethod(dataset_scales.convert_to_dimensional_name)
 
     def __init__(self, dataset: xr.Dataset) -> None:
         """Store a reference to the dataset."""
         self._dataset = dataset
 
-    def convert(self, stress: str, length: str, time: str, **si_scales: float) -> xr.Dataset:
+    def convert_to_units(
+        self, stress: str, length: str, time: str, **si_scales: float
+    ) -> xr.Dataset:
         """Convert the dataset to physical units of stress, length and time.
 
         Parameters
@@ -57,7 +59,7 @@ class DatasetUnits:
         scales = dataset_scales.read_si_scales(self._dataset, **si_scales)
         return dataset_scales.convert_dataset_units(self._dataset, scales, stress, length, time)
 
-    def convert_for_display(self) -> xr.Dataset:
+    def convert_to_display_units(self) -> xr.Dataset:
         """Convert the results of a rig to MPa, um and s for tables and figures.
 
         Returns
@@ -67,7 +69,7 @@ class DatasetUnits:
         """
         return dataset_scales.convert_to_display_units(self._dataset)
 
-    def scale_of(self, variable_name: str) -> UnitScale | None:
+    def find_scale_of_variable(self, variable_name: str) -> UnitScale | None:
         """Find the SI value of the dimensionless unit of a variable.
 
         Parameters
@@ -88,7 +90,7 @@ class DatasetUnits:
         scales = dataset_scales.read_si_scales(self._dataset)
         return dataset_scales.find_scale_of_variable(self._dataset[variable_name], scales)
 
-    def slip_rate_from_log(
+    def compute_slip_rate_from_log(
         self, variable_name: str, factor: float | xr.Variable, units: str
     ) -> dict[str, xr.Variable]:
         r"""Compute slip rates from their decimal logarithms.
@@ -110,6 +112,6 @@ class DatasetUnits:
         return dataset_scales.slip_rate_from_log(self._dataset, variable_name, factor, units)
 
     @property
-    def are_unexpected_by_figures(self) -> bool:
+    def differ_from_units_of_figures(self) -> bool:
         """True if the results do not have the units that study figures require."""
         return dataset_scales.has_units_unexpected_by_its_figures(self._dataset)

@@ -9,7 +9,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.units import convert_to_si
 
 
-def replace_b_by_ratio(fields: Mapping[str, Any]) -> dict[str, Any]:
+def replace_b_by_b_over_a(scene_fields: Mapping[str, Any]) -> dict[str, Any]:
     """Replace the parameter b by the scene field ``b_over_a``.
 
     Parameters
@@ -27,7 +27,10 @@ def replace_b_by_ratio(fields: Mapping[str, Any]) -> dict[str, Any]:
     InvalidValue
         If ``b_over_a`` is also given, or if ``a`` is missing.
     """
-    b, others = fields["b"], {name: value for name, value in fields.items() if name != "b"}
+    b, others = (
+        scene_fields["b"],
+        {name: value for name, value in scene_fields.items() if name != "b"},
+    )
     if "b_over_a" in others:
         raise InvalidValue("b", b, "cannot be combined with b_over_a")
     if others.get("a") is None:

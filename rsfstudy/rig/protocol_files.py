@@ -17,7 +17,7 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.column_reading import ReadingOptions, read_columns
 from rsfstudy.rig.columns import Column
-from rsfstudy.rig.rig import SLIDER_UNITS_OF_SEGMENT_FIELDS, Rig
+from rsfstudy.rig.rig import DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD, Rig
 from rsfstudy.rig.table_files import read_table
 from rsfstudy.rig.usual_headings import UsableColumns
 from rsfstudy.slider import (
@@ -29,7 +29,7 @@ from rsfstudy.slider import (
 )
 
 #: Column names of a sampled history, and the units of the columns if the user passes no rig.
-_SLIDER_UNITS_OF_RECORD_COLUMNS = {
+_DIMENSIONLESS_UNIT_BY_HISTORY_COLUMN = {
     "time": "D_c/V_*", "displacement": "D_c", "velocity": "V_*", "normal_stress": "sigma_*",
     "pore_pressure": "sigma_*",
 }  # fmt: skip
@@ -117,7 +117,9 @@ def history(
     >>> round(rsfstudy.Scene(loading=loading).load_velocity, 9)
     2.0
     """
-    found = _read_history_columns(record, columns, rig, ReadingOptions.parse("history", reading))
+    found = _read_history_columns(
+        record, columns, rig, ReadingOptions.from_keywords("history", reading)
+    )
     if "time" not in found or len(found) == 1:
         remedy = 'Pass, for example, {"time": ..., "displacement": ...}.'
         raise InvalidValue(
@@ -137,53 +139,61 @@ def history(
         )
         raise InvalidValue("record", ..., rule)
     values = {
-        key: _convert_column_to_slider_units(key, column, rig) for key, column in found.items()
+        key: _convert_column_to_dimensionless(key, column, rig) for key, column in found.items()
     }
     time = values["time"]
     late = np.append(False, np.diff(time) < MIN_SEGMENT_DURATION)
-    found["time"].check_values("time", late, "must be later than the time of the previous sample")
-    velocity, back = _load_point_velocity(values, found)
+    found["time"].raise_for_invalid_values(
+        "time", late, "must be later than the time of the previous sample"
+    )
+    velocity, back = _compute_load_point_velocity(values, found)
     fall = None
     if "normal_stress" in found or "pore_pressure" in found:
         ones, none = np.ones(len(time)), np.zeros(len(time))
         fall = values.get("pore_pressure", none) - (values.get("normal_stress", ones) - 1.0)
         key = "normal_stress" if "normal_stress" in found else "pore_pressure"
         rule = "must keep the effective normal stress (normal stress minus pore pressure) positive"
-        found[key].check_values(key, fall >= 1.0, rule)
+        found[key].raise_for_invalid_values(key, fall >= 1.0, rule)
     of_pressure = "pore_pressure" in found and "normal_stress" not in found
     return SampledHistory.from_samples(
-        time, velocity, fall, name, of_pressure=of_pressure, first_reversal=back
+        time, velocity, fall, name, of_pressure=of_pressure, first_load_point_reversal=back
     )
 
 
 def _read_history_columns(
-    record: Any, columns: Mapping[str, Any] | None, rig: Rig | None, options: ReadingOptions
+    record: Any,
+    selected_columns: Mapping[str, Any] | None,
+    rig: Rig | None,
+    reading_options: ReadingOptions,
 ) -> dict[str, Column]:
     """Read the columns of a source that describe a loading history."""
-    if options.filter:
+    if reading_options.filter:
         remedy = "Filter the columns before you pass them as arrays."
         raise InvalidValue(
-            "filter", options.filter, "cannot be applied to a loading history", remedy=remedy
+            "filter",
+            reading_options.filter,
+            "cannot be applied to a loading history",
+            remedy=remedy,
         )
-    usable = UsableColumns((*_SLIDER_UNITS_OF_RECORD_COLUMNS,))
-    found = read_columns(record, columns, usable, options).columns
+    usable = UsableColumns((*_DIMENSIONLESS_UNIT_BY_HISTORY_COLUMN,))
+    found = read_columns(record, selected_columns, usable, reading_options).columns
     for name, column in found.items():
         if rig is not None and hasattr(record, "data_vars") and not column.units:
             raise InvalidValue(
                 name, name, "has no units", remedy="Set the attribute units of the variable."
             )
-    thinned = slice(None, None, options.thin)
+    thinned = slice(None, None, reading_options.thin)
     return {
         name: of._replace(values=of.values[thinned], line_numbers=of.line_numbers[thinned])
         for name, of in found.items()
     }
 
 
-def _convert_column_to_slider_units(
+def _convert_column_to_dimensionless(
     quantity_name: str, column: Column, rig: Rig | None
 ) -> np.ndarray:
     """Convert a column to dimensionless units."""
-    scale, units = _SLIDER_UNITS_OF_RECORD_COLUMNS[quantity_name], column.units
+    scale, units = _DIMENSIONLESS_UNIT_BY_HISTORY_COLUMN[quantity_name], column.units
     if units == scale or (rig is None and units in ("", "1")):
         return column.values
     if rig is None:
@@ -195,8 +205,8 @@ def _convert_column_to_slider_units(
     return np.asarray(column.values * one)
 
 
-def _load_point_velocity(
-    record_values: Mapping[str, np.ndarray], record_columns: Mapping[str, Column]
+def _compute_load_point_velocity(
+    values_by_column: Mapping[str, np.ndarray], columns_by_name: Mapping[str, Column]
 ) -> tuple[np.ndarray, tuple[str, float, str] | None]:
     """Compute the velocity of the load point after each sample.
 
@@ -204,17 +214,17 @@ def _load_point_velocity(
     load point moves backwards, or None if the load point never moves backwards.
     """
     time, key = (
-        record_values["time"],
-        "velocity" if "velocity" in record_columns else "displacement",
+        values_by_column["time"],
+        "velocity" if "velocity" in columns_by_name else "displacement",
     )
-    if key not in record_columns:
+    if key not in columns_by_name:
         return np.ones(len(time)), None
     if key == "velocity":
-        speeds = record_values[key]
+        speeds = values_by_column[key]
         back = speeds < 0.0
         mean = np.append(0.5 * (speeds[:-1] + speeds[1:]), speeds[-1])
     else:
-        steps = np.diff(record_values[key])
+        steps = np.diff(values_by_column[key])
         back = np.append(False, steps < 0.0)
         speeds = steps / np.diff(time)
         mean = np.append(speeds, speeds[-1])
@@ -223,8 +233,8 @@ def _load_point_velocity(
     first = int(np.argmax(back))
     return mean, (
         key,
-        float(record_columns[key].values[first]),
-        record_columns[key].location(first),
+        float(columns_by_name[key].values[first]),
+        columns_by_name[key].format_location_of_row(first),
     )
 
 
@@ -279,7 +289,7 @@ def read_protocol(
         if key not in SEGMENT_MAPPING_KEYS:
             raise InvalidValue("column", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)
     units = {key: column.units for key, column in columns.items()}
-    of_slider = all(SLIDER_UNITS_OF_SEGMENT_FIELDS[key] == of for key, of in units.items())
+    of_slider = all(DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD[key] == of for key, of in units.items())
     if not of_slider and rig is None:
         remedy = "Pass rig=, or use the dimensionless units V_*, D_c and D_c/V_*."
         rule = "require a rig"

@@ -17,7 +17,9 @@ _LOG_RANGE_SYNTAX_REMEDY = (
 _MAX_POINTS_OF_RANGE = 1_000_000
 
 
-def expand_range(argument_name: str, text: str, range_text: str) -> list[float] | list[str]:
+def expand_range(
+    argument_name: str, argument_text: str, range_text: str
+) -> list[float] | list[str]:
     """Expand a range such as "1:100:20:log" to a list of numbers.
 
     Parameters
@@ -41,28 +43,35 @@ def expand_range(argument_name: str, text: str, range_text: str) -> list[float] 
     """
     *before, last = range_text.split(":")
     last, _, units = last.strip().partition(" ")
-    found = _expand_range_of_numbers(argument_name, text, [*before, last])
+    found = _expand_range_without_units(argument_name, argument_text, [*before, last])
     return [f"{number!r} {units.strip()}" for number in found] if units.strip() else found
 
 
-def _expand_range_of_numbers(
-    argument_name: str, text: str, range_parts: Sequence[str]
+def _expand_range_without_units(
+    argument_name: str, argument_text: str, range_parts: Sequence[str]
 ) -> list[float]:
     spacing = range_parts[3].strip().lower() if len(range_parts) == 4 else ""
     first, last, points = map(
         parse_number, range_parts[:3] if len(range_parts) in (3, 4) else ["", "", ""]
     )
     if first is None or last is None or points is None or spacing not in ("", "log"):
-        raise InvalidValue(argument_name, text, _RANGE_SYNTAX_RULE, remedy=_LOG_RANGE_SYNTAX_REMEDY)
+        raise InvalidValue(
+            argument_name, argument_text, _RANGE_SYNTAX_RULE, remedy=_LOG_RANGE_SYNTAX_REMEDY
+        )
     finite = math.isfinite(first) and math.isfinite(last)
     if not finite or points not in range(1, _MAX_POINTS_OF_RANGE + 1):
         raise InvalidValue(
-            argument_name, text, f"{_RANGE_SYNTAX_RULE}, from 1 to {_MAX_POINTS_OF_RANGE:,}"
+            argument_name,
+            argument_text,
+            f"{_RANGE_SYNTAX_RULE}, from 1 to {_MAX_POINTS_OF_RANGE:,}",
         )
     if spacing and min(first, last) <= 0.0:
         remedy = "Remove :log, or use positive limits."
         raise InvalidValue(
-            argument_name, text, "must have positive limits for logarithmic spacing", remedy=remedy
+            argument_name,
+            argument_text,
+            "must have positive limits for logarithmic spacing",
+            remedy=remedy,
         )
     laid = np.geomspace if spacing else np.linspace
     return [float(x) for x in laid(first, last, int(points))]

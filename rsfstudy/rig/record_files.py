@@ -16,18 +16,18 @@ import numpy as np
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import RECORD_COLUMNS, Record
-from rsfstudy.rig.column_reading import ColumnsOfSource, ReadingOptions, read_columns
+from rsfstudy.rig.column_reading import ColumnsReadFromSource, ReadingOptions, read_columns
 from rsfstudy.rig.rig_quantities import is_stiffness_over_normal_stress
 from rsfstudy.rig.row_selection import parse_filter
 from rsfstudy.rig.units import convert_to_si
 from rsfstudy.rig.usual_headings import (
     UsableColumns,
-    find_factor_to_record_units,
-    missing_columns_error,
+    build_missing_columns_error,
+    compute_factor_to_record_units,
 )
 
 #: Columns of a file from which a ``Record`` is built.
-_USABLE_COLUMNS = UsableColumns(
+_USABLE_RECORD_COLUMNS = UsableColumns(
     ("time", "displacement", "slip", "friction", "shear_stress", "normal_stress")
 )
 
@@ -135,38 +135,42 @@ def read_record(
     if earlier is not None and earlier.filter and filter:
         rule = "cannot be applied, because the record is already filtered"
         raise InvalidValue("filter", filter, rule, remedy="Apply one filter only.")
-    found = read_columns(source, columns, _USABLE_COLUMNS, options)
+    found = read_columns(source, columns, _USABLE_RECORD_COLUMNS, options)
     values = {key: _convert_to_record_units(key, found) for key in found.columns}
     _check_required_columns(found)
     _add_derived_columns(values, normal_stress, stiffness)
     values = {q.name: values[q.name] for q in RECORD_COLUMNS if q.name in values}
-    values, smoothing = options.smooth(values, ("friction",))
-    processing = tuple(found.processing + smoothing)
+    values, smoothing = options.filter_and_thin_columns(values, ("friction",))
+    processing = tuple(found.row_selection_descriptions + smoothing)
     if (chosen := parse_filter(filter)) is not None:
         filter = f"{chosen.kind} {chosen.size!r}"
     if earlier is not None:
         processing = earlier.processing + processing
         earlier = replace(earlier, name=name or earlier.name, filter=filter or earlier.filter)
         return replace(earlier, columns=values, processing=processing)
-    name = name or _record_name_from_source(source)
+    name = name or _derive_record_name_from_source(source)
     return Record(values, name, processing=processing, filter=filter)
 
 
-def _convert_to_record_units(name: str, found: ColumnsOfSource) -> np.ndarray:
+def _convert_to_record_units(
+    column_name: str, columns_of_source: ColumnsReadFromSource
+) -> np.ndarray:
     """Return the values of a column in the units of a ``Record``."""
-    column = found.columns[name]
+    column = columns_of_source.columns[column_name]
     try:
-        return column.values * find_factor_to_record_units(name, column.units)
+        return column.values * compute_factor_to_record_units(column_name, column.units)
     except InvalidValue as error:
-        if not column.column_number:
+        if not column.one_based_column_number:
             raise
-        place = f"{found.table.location}, column {column.column_number}"
+        place = (
+            f"{columns_of_source.table.heading_location}, column {column.one_based_column_number}"
+        )
         raise error.with_location(place) from error
 
 
-def _check_required_columns(found: ColumnsOfSource) -> None:
+def _check_required_columns(columns_of_source: ColumnsReadFromSource) -> None:
     """Raise ``InvalidValue`` if a required column of a record is missing."""
-    names, table = found.columns, found.table
+    names, table = columns_of_source.columns, columns_of_source.table
     moved = {"displacement", "slip"} & {*names}
     rubbed = {"friction", "shear_stress"} & {*names}
     if not ("time" in names and moved):
@@ -176,31 +180,35 @@ def _check_required_columns(found: ColumnsOfSource) -> None:
                 ", which every record must contain. If the record has no time or no "
                 "displacement, use rsfstudy.events"
             )
-        raise missing_columns_error(table, rule)
+        raise build_missing_columns_error(table, rule)
     if not rubbed:
-        raise missing_columns_error(table, "has no recognised heading for friction or shear stress")
+        raise build_missing_columns_error(
+            table, "has no recognised heading for friction or shear stress"
+        )
 
 
 def _add_derived_columns(
-    record_values: dict[str, np.ndarray], normal_stress: Any, stiffness: Any
+    values_by_column: dict[str, np.ndarray], normal_stress: Any, stiffness: Any
 ) -> None:
     """Add the columns normal stress, friction and load point displacement."""
-    if normal_stress is not None and "normal_stress" not in record_values:
+    if normal_stress is not None and "normal_stress" not in values_by_column:
         stated = convert_to_si("normal_stress", normal_stress, "Pa")
-        record_values["normal_stress"] = np.full(len(record_values["time"]), stated)
-    if "friction" not in record_values:
-        stress = record_values.get("normal_stress")
+        values_by_column["normal_stress"] = np.full(len(values_by_column["time"]), stated)
+    if "friction" not in values_by_column:
+        stress = values_by_column.get("normal_stress")
         if stress is None:
-            rule = f"has no column for normal stress (columns: {', '.join(record_values)})"
+            rule = f"has no column for normal stress (columns: {', '.join(values_by_column)})"
             remedy = "Pass --normal-stress (normal_stress=), for example '20 MPa'."
             raise InvalidValue("record", ..., rule, remedy=remedy)
-        check_compression(stress)
-        record_values["friction"] = record_values["shear_stress"] / stress
-    if "displacement" not in record_values:
-        record_values["displacement"] = _compute_load_point_displacement(record_values, stiffness)
+        check_normal_stress_is_positive(stress)
+        values_by_column["friction"] = values_by_column["shear_stress"] / stress
+    if "displacement" not in values_by_column:
+        values_by_column["displacement"] = _compute_load_point_displacement(
+            values_by_column, stiffness
+        )
 
 
-def check_compression(normal_stress: np.ndarray) -> None:
+def check_normal_stress_is_positive(normal_stress: np.ndarray) -> None:
     """Raise an error if the normal stress of a record is not positive.
 
     Parameters
@@ -228,7 +236,7 @@ def check_compression(normal_stress: np.ndarray) -> None:
     raise InvalidValue("normal_stress", float(normal_stress[row]), rule, remedy=remedy)
 
 
-def _record_name_from_source(source: Any) -> str:
+def _derive_record_name_from_source(source: Any) -> str:
     """Convert the name of a file to a valid Python identifier."""
     stem = Path(source).stem if isinstance(source, str | Path) else "record"
     text = re.sub(r"\W", "_", stem, flags=re.ASCII)
@@ -236,7 +244,7 @@ def _record_name_from_source(source: Any) -> str:
 
 
 def _compute_load_point_displacement(
-    record_values: dict[str, np.ndarray], stiffness: Any
+    values_by_column: dict[str, np.ndarray], stiffness: Any
 ) -> np.ndarray:
     """Compute load point displacement in um from slip, friction and stiffness.
 
@@ -255,7 +263,7 @@ def _compute_load_point_displacement(
             "stress divided by stiffness"
         )
         raise InvalidValue("slip", ..., rule, remedy=remedy)
-    friction, stress = record_values["friction"], record_values.get("normal_stress")
+    friction, stress = values_by_column["friction"], values_by_column.get("normal_stress")
     is_number = isinstance(stiffness, int | float)
     over_stress = is_number or is_stiffness_over_normal_stress(stiffness)
     if is_number:
@@ -265,8 +273,8 @@ def _compute_load_point_displacement(
     if not per_um > 0.0:
         raise InvalidValue("stiffness", stiffness, "must be positive")
     if over_stress:
-        return np.asarray(record_values["slip"] + friction / per_um)
+        return np.asarray(values_by_column["slip"] + friction / per_um)
     if stress is None:
         remedy = "Pass --normal-stress (normal_stress=), or the stiffness in 1/um."
         raise InvalidValue("stiffness", stiffness, "requires a normal stress", remedy=remedy)
-    return np.asarray(record_values["slip"] + friction * stress / per_um)
+    return np.asarray(values_by_column["slip"] + friction * stress / per_um)

@@ -27,19 +27,19 @@ from rsfstudy.rig.dataset_scales import (
     convert_dataset_units,
     read_si_scales,
 )
-from rsfstudy.rig.fault_parameters import replace_b_by_ratio
+from rsfstudy.rig.fault_parameters import replace_b_by_b_over_a
 from rsfstudy.rig.rig_quantities import (
-    AXIS_NAME_BY_RIG_NAME,
+    AXIS_NAME_BY_RIG_QUANTITY,
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
     RIG_QUANTITIES,
     SCENE_QUANTITY_BY_FIELD_NAME,
     SI_UNIT_BY_SCALE,
     check_rig_quantities_are_consistent,
+    convert_rig_to_display_units,
     convert_rig_value_and_warn_if_unusual,
     convert_rig_value_to_si,
     derive_scene_fields_from_rig,
     find_si_units_of_field,
-    in_display_units,
     is_stiffness_over_normal_stress,
 )
 from rsfstudy.rig.units import convert_to_si
@@ -48,7 +48,7 @@ from rsfstudy.slider import Protocol, Scene, SceneFields, protocol
 __getattr__ = build_getattr_for_former_names(__name__)
 
 #: Dimensionless units of the fields of a loading segment.
-SLIDER_UNITS_OF_SEGMENT_FIELDS = {
+DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
 }  # fmt: skip
@@ -145,7 +145,7 @@ class Rig(HtmlTableMixin):
     #: Quantities of a rig by name, with their units and limits.
     QUANTITIES: ClassVar = RIG_QUANTITIES
     is_stiffness_over_stress = staticmethod(is_stiffness_over_normal_stress)
-    convert_quantities_for_display = staticmethod(in_display_units)
+    convert_quantities_for_display = staticmethod(convert_rig_to_display_units)
 
     normal_stress: Any
     slip_distance: Any
@@ -231,7 +231,7 @@ class Rig(HtmlTableMixin):
 
     def __repr__(self) -> str:
         """Return a string that lists the specified quantities of the rig with units."""
-        shown = in_display_units(self.as_dict())
+        shown = convert_rig_to_display_units(self.as_dict())
         parts = [f"{name}='{value:.12g} {units}'" for name, (value, units) in shown.items()]
         return f"Rig({', '.join(parts)})"
 
@@ -265,7 +265,7 @@ class Rig(HtmlTableMixin):
             ``a``.
         """
         if "b" in fields:
-            fields = replace_b_by_ratio(fields)
+            fields = replace_b_by_b_over_a(fields)
         if find_si_units_of_field("instability_norm", norm := fields.get("instability_norm")):
             scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
             return scene.with_(instability_norm=convert_to_instability_norm(self, norm, scene))
@@ -404,7 +404,8 @@ class Rig(HtmlTableMixin):
     def axis_fields(self) -> dict[str, float]:
         """Rig quantities in SI units, keyed by the names that axes use."""
         return {
-            AXIS_NAME_BY_RIG_NAME.get(name, name): value for name, value in self.as_dict().items()
+            AXIS_NAME_BY_RIG_QUANTITY.get(name, name): value
+            for name, value in self.as_dict().items()
         }
 
     @property
@@ -428,8 +429,8 @@ class Rig(HtmlTableMixin):
             return segment_fields  # A Segment is dimensionless.
         try:
             return {
-                key: self.dimensionless(value, SLIDER_UNITS_OF_SEGMENT_FIELDS[key], key)
-                if key in SLIDER_UNITS_OF_SEGMENT_FIELDS
+                key: self.dimensionless(value, DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD[key], key)
+                if key in DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD
                 else value
                 for key, value in segment_fields.items()
             }

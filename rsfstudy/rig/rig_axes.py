@@ -11,9 +11,9 @@ class RigAxes:
     #: Names of the ratios to which the scene converts dimensional fields.
     RATIO_FIELD_BY_DIMENSIONAL_NAME = rig_quantities.RATIO_FIELD_BY_DIMENSIONAL_NAME
 
-    create = staticmethod(axes_with_units.make_axis_with_units)
-    name_and_units = staticmethod(axes_with_units.axis_name_and_units)
-    convert_values = staticmethod(axes_with_units.convert_values_to_units)
-    convert_to_stated_units = staticmethod(axes_with_units.convert_axis_to_stated_units)
+    create_axis = staticmethod(axes_with_units.make_axis_with_units)
+    find_axis_name_and_si_units = staticmethod(axes_with_units.find_axis_name_and_si_units)
+    convert_values_to_units = staticmethod(axes_with_units.convert_values_to_units)
+    convert_axis_to_stated_units = staticmethod(axes_with_units.convert_axis_to_stated_units)
     replace_rig_quantity = staticmethod(rig_scenes.replace_rig_quantity)
-    convert_scene_and_axes = staticmethod(rig_scenes.convert_scene_and_axes_to_rig)
+    convert_scene_and_axes_to_rig = staticmethod(rig_scenes.convert_scene_and_axes_to_rig)

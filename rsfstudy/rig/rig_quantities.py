@@ -79,22 +79,24 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
     ),
 }
 #: Quantities that shear heating requires, and optional quantities for shear heating.
-HEAT_QUANTITIES = (
+REQUIRED_SHEAR_HEATING_QUANTITIES = (
     "thermal_diffusivity", "heat_capacity", "shear_zone_width", "reference_temperature"
 )  # fmt: skip
-OPTIONAL_HEAT_QUANTITIES = (
+OPTIONAL_SHEAR_HEATING_QUANTITIES = (
     "heat_loss_width", "direct_activation_energy", "evolution_activation_energy",
     "pressurisation_factor",
 )  # fmt: skip
 #: Gas constant in J/(mol K).
 GAS_CONSTANT = 8.31446261815324
 #: Quantities that every rig needs, because they determine the scales of all other quantities.
-REQUIRED_QUANTITIES = ("normal_stress", "slip_distance", "reference_velocity")
+REQUIRED_RIG_QUANTITIES = ("normal_stress", "slip_distance", "reference_velocity")
 #: Axis names that differ from the names of rig quantities. Such an axis name is needed if a scene
 #: field has the same name as the rig quantity.
-AXIS_NAME_BY_RIG_NAME = {"normal_stress": "sigma_star"}
+AXIS_NAME_BY_RIG_QUANTITY = {"normal_stress": "sigma_star"}
 #: Names of rig quantities, keyed by the names that axes use.
-RIG_NAME_BY_AXIS_NAME = {AXIS_NAME_BY_RIG_NAME.get(name, name): name for name in RIG_QUANTITIES}
+RIG_QUANTITY_BY_AXIS_NAME = {
+    AXIS_NAME_BY_RIG_QUANTITY.get(name, name): name for name in RIG_QUANTITIES
+}
 #: SI units, keyed by the scales of scene fields. A scale is the dimensionless unit of a scene
 #: field.
 SI_UNIT_BY_SCALE = {
@@ -248,8 +250,12 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
             "requires shear_modulus, because both determine radiation damping",
             remedy=remedy,
         )
-    given = [n for n in (*HEAT_QUANTITIES, *OPTIONAL_HEAT_QUANTITIES) if n in rig_values]
-    missing = [n for n in HEAT_QUANTITIES if n not in rig_values]
+    given = [
+        n
+        for n in (*REQUIRED_SHEAR_HEATING_QUANTITIES, *OPTIONAL_SHEAR_HEATING_QUANTITIES)
+        if n in rig_values
+    ]
+    missing = [n for n in REQUIRED_SHEAR_HEATING_QUANTITIES if n not in rig_values]
     if given and missing:
         rule = (
             f"requires {', '.join(missing)}, because all of these quantities determine "
@@ -259,7 +265,7 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
         raise InvalidValue(given[0], rig_values[given[0]], rule, remedy=remedy)
 
 
-def in_display_units(
+def convert_rig_to_display_units(
     rig: Mapping[str, float], excluded_axis_names: Collection[str] = ()
 ) -> dict[str, tuple[float, str]]:
     """Convert the quantities of a rig to display units.
@@ -279,7 +285,7 @@ def in_display_units(
     units = {
         n: RIG_QUANTITIES[n].si_units
         for n in rig
-        if AXIS_NAME_BY_RIG_NAME.get(n, n) not in excluded_axis_names
+        if AXIS_NAME_BY_RIG_QUANTITY.get(n, n) not in excluded_axis_names
     }
     shown = {n: DISPLAY_UNIT_BY_SI_UNIT.get(si, si) for n, si in units.items()}
     return {
@@ -325,14 +331,14 @@ def derive_scene_fields_from_rig(
         )
     choices: dict[str, Any] = {"inertia": True} if "period" in found else {}
     if with_heat and "heat_capacity" in rig_values:
-        found |= _derive_heat_fields(rig_values)
+        found |= _derive_shear_heating_fields(rig_values)
         choices["temperature"] = "shear_heating"
         choices |= {"fluid": "thermal"} if "pressurisation" in found else {}
     plain = {name: v if isinstance(v, np.ndarray) else float(v) for name, v in found.items()}
     return plain | choices
 
 
-def _derive_heat_fields(rig: Mapping[str, Any]) -> dict[str, Any]:
+def _derive_shear_heating_fields(rig: Mapping[str, Any]) -> dict[str, Any]:
     """Compute the scene fields of shear heating and thermal pressurisation."""
     temperature, stress = rig["reference_temperature"], rig["normal_stress"]
     per_slip = rig["heat_capacity"] * rig["shear_zone_width"] * temperature

@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes import Axis, AxisRow
+from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.axes_with_units import factor_to_si, make_axis_with_units
+from rsfstudy.rig.axes_with_units import compute_factor_to_si, make_axis_with_units
 from rsfstudy.rig.dataset_scales import DIMENSIONLESS_PREFIX, build_scales_of_rig
 from rsfstudy.rig.rig import Rig, convert_to_instability_norm
 from rsfstudy.rig.rig_quantities import (
-    AXIS_NAME_BY_RIG_NAME,
+    AXIS_NAME_BY_RIG_QUANTITY,
     DISPLAY_UNIT_BY_SI_UNIT,
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
-    REQUIRED_QUANTITIES,
-    RIG_NAME_BY_AXIS_NAME,
+    REQUIRED_RIG_QUANTITIES,
+    RIG_QUANTITY_BY_AXIS_NAME,
     SCENE_QUANTITY_BY_FIELD_NAME,
     SI_UNIT_BY_SCALE,
     check_rig_quantities_are_consistent,
@@ -66,7 +66,7 @@ class LatticeScenesOnRig:
     def __post_init__(self) -> None:
         """Check that the base scene and the axes belong to the rig."""
         theirs = self.base_scene.as_dict()
-        for name, value in self._derive_fields(self.rig.as_dict()).items():
+        for name, value in self._derive_scene_fields(self.rig.as_dict()).items():
             if not isinstance(value, bool | str) and not _is_close_within_rounding(
                 theirs.get(name), value
             ):
@@ -77,24 +77,24 @@ class LatticeScenesOnRig:
             for row in along.rows:
                 lacks = [name for name in self.rig.axis_fields if name not in row]
                 if lacks and not {
-                    AXIS_NAME_BY_RIG_NAME.get(name, name) for name in REQUIRED_QUANTITIES
+                    AXIS_NAME_BY_RIG_QUANTITY.get(name, name) for name in REQUIRED_RIG_QUANTITIES
                 } & set(lacks):
                     rule = f"must contain {lacks[0]}, because the rig of the study contains it"
                     raise InvalidValue(
                         along.dimension, dict(row), rule, remedy="Pass it as an argument."
                     )
 
-    def _derive_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
+    def _derive_scene_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
         """Compute scene fields from the rig, without heating if the base is isothermal."""
         hot = self.base_scene.parts.temperature.name != "isothermal"
         return derive_scene_fields_from_rig(rig_values, with_heat=hot)
 
     @property
-    def units(self) -> dict[str, str]:
+    def units_by_axis_name(self) -> dict[str, str]:
         """Units of the quantities that vary along axes, keyed by axis name."""
         return {name: units for along in self.axes for name, units in along.units.items()}
 
-    def compute_rig_quantities(self, axis_row: AxisRow) -> dict[str, Any]:
+    def compute_rig_quantities(self, axis_row: AxisPointFieldValues) -> dict[str, Any]:
         """Compute the rig quantities for one row of axis values.
 
         Parameters
@@ -112,11 +112,11 @@ class LatticeScenesOnRig:
         InvalidValue
             If the quantities contradict each other.
         """
-        found, units = dict(self.rig.as_dict()), self.units
-        for name in RIG_NAME_BY_AXIS_NAME:
+        found, units = dict(self.rig.as_dict()), self.units_by_axis_name
+        for name in RIG_QUANTITY_BY_AXIS_NAME:
             if name in units and axis_row.get(name) is not None:
-                found[RIG_NAME_BY_AXIS_NAME[name]] = multiply_by_exact_fraction(
-                    axis_row[name], factor_to_si(name, units[name])
+                found[RIG_QUANTITY_BY_AXIS_NAME[name]] = multiply_by_exact_fraction(
+                    axis_row[name], compute_factor_to_si(name, units[name])
                 )
         in_friction = is_stiffness_over_normal_stress(f"1 {units.get('stiffness', '')}")
         if axis_row.get("stiffness") is not None and in_friction:
@@ -124,7 +124,7 @@ class LatticeScenesOnRig:
         check_rig_quantities_are_consistent(found)
         return found
 
-    def compute_scene_fields(self, axis_row: AxisRow) -> dict[str, Any]:
+    def compute_scene_fields(self, axis_row: AxisPointFieldValues) -> dict[str, Any]:
         """Compute the scene fields for one row of axis values.
 
         Parameters
@@ -137,10 +137,12 @@ class LatticeScenesOnRig:
         dict of str to object
             Values of the scene fields that may differ from the base scene.
         """
-        units, rig = self.units, self.compute_rig_quantities(axis_row)
-        here, found = scale_factors_of_rig(rig), {}
-        if set(RIG_NAME_BY_AXIS_NAME) & set(units) & set(axis_row):
-            found = self._compute_base_fields_constant_in_si(here) | self._derive_fields(rig)
+        units, rig = self.units_by_axis_name, self.compute_rig_quantities(axis_row)
+        here, found = compute_scale_factors_of_rig(rig), {}
+        if set(RIG_QUANTITY_BY_AXIS_NAME) & set(units) & set(axis_row):
+            found = self._compute_base_fields_with_fixed_si_value(here) | self._derive_scene_fields(
+                rig
+            )
             if "period" in self.rig.as_dict() and not self.base_scene.has_mass:
                 # The base scene ignores the inertia of the rig.
                 found.pop("inertia", None)
@@ -148,17 +150,17 @@ class LatticeScenesOnRig:
             field = RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name, name)
             if name not in units:
                 found[name] = value
-            elif name not in RIG_NAME_BY_AXIS_NAME:
+            elif name not in RIG_QUANTITY_BY_AXIS_NAME:
                 scale = SCENE_QUANTITY_BY_FIELD_NAME[field].scale
-                in_si = multiply_by_exact_fraction(value, factor_to_si(name, units[name]))
+                in_si = multiply_by_exact_fraction(value, compute_factor_to_si(name, units[name]))
                 found[field] = in_si / (here[scale] if scale else 1.0)
         return found
 
-    def _compute_base_fields_constant_in_si(
+    def _compute_base_fields_with_fixed_si_value(
         self, scale_factors_of_cell: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Return the base scene fields that have the same SI value in all cells."""
-        base = scale_factors_of_rig(self.rig.as_dict())
+        base = compute_scale_factors_of_rig(self.rig.as_dict())
         held = {
             name: value
             * (
@@ -175,7 +177,7 @@ class LatticeScenesOnRig:
             )
         return held
 
-    def build_scale_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    def compute_scale_and_field_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
         """Compute the dimensionless fields and scales of all lattice cells.
 
         Returns
@@ -186,7 +188,9 @@ class LatticeScenesOnRig:
             ``dimensionless_`` is added to the name of the field.
         """
         # An axis with one point gets a second point to find out if the values depend on the axis.
-        alone = {axis.dimension for axis in self.axes if len(axis) == 1 and axis.is_single_field}
+        alone = {
+            axis.dimension for axis in self.axes if len(axis) == 1 and axis.varies_single_field
+        }
         along = [
             _add_second_point_to_axis(a) if a.dimension in alone else a
             for a in self.axes
@@ -214,8 +218,10 @@ class LatticeScenesOnRig:
         }
 
     def _compute_scales_and_fields(self, axis_row: Mapping[str, Any]) -> dict[str, Any]:
-        units, rig = self.units, self.compute_rig_quantities(axis_row)
-        scales_ = {AXIS_NAME_BY_RIG_NAME.get(name, name): rig[name] for name in REQUIRED_QUANTITIES}
+        units, rig = self.units_by_axis_name, self.compute_rig_quantities(axis_row)
+        scales_ = {
+            AXIS_NAME_BY_RIG_QUANTITY.get(name, name): rig[name] for name in REQUIRED_RIG_QUANTITIES
+        }
         found = {name: value for name, value in scales_.items() if name not in units}
         for name, value in self.compute_scene_fields(axis_row).items():
             if isinstance(value, bool | str) or (name in axis_row and name not in units):
@@ -233,7 +239,7 @@ def _is_close_within_rounding(other_value: Any, value: Any) -> bool:
 
 
 def convert_scene_and_axes_to_rig(
-    rig: Rig, base: Scene, axes: Sequence[Axis]
+    rig: Rig, base_scene: Scene, axes: Sequence[Axis]
 ) -> tuple[Scene, list[Axis], dict[str, float]]:
     """Convert a dimensionless scene and its axes to physical units.
 
@@ -255,7 +261,7 @@ def convert_scene_and_axes_to_rig(
     sizes : dict of str to float
         Factor by which the axis values of each field were multiplied in the conversion.
     """
-    sizes_of = scale_factors_of_rig(rig.as_dict())
+    sizes_of = compute_scale_factors_of_rig(rig.as_dict())
     converted: list[Axis] = []
     every: dict[str, float] = {}
     for along in axes:
@@ -269,7 +275,7 @@ def convert_scene_and_axes_to_rig(
             for n, scale in scales.items()
         }
         sizes = {
-            n: multiply_by_exact_fraction(sizes_of[s], 1 / factor_to_si(n, units[n]))
+            n: multiply_by_exact_fraction(sizes_of[s], 1 / compute_factor_to_si(n, units[n]))
             for n, s in scales.items()
         }
         every |= sizes
@@ -283,7 +289,7 @@ def convert_scene_and_axes_to_rig(
     # scene.
     if {"inertia", "radiation_damping"} & set(changes):
         changes = {"inertia": False, "radiation_damping": 0.0, **changes}
-    return base.with_(**changes), converted, every
+    return base_scene.with_(**changes), converted, every
 
 
 def replace_rig_quantity(
@@ -317,8 +323,8 @@ def replace_rig_quantity(
     changed = base_scene.with_(
         **LatticeScenesOnRig(rig, base_scene, [axis]).compute_scene_fields(axis.rows[0])
     )
-    if quantity_name in RIG_NAME_BY_AXIS_NAME:
-        quantity = RIG_NAME_BY_AXIS_NAME[quantity_name]
+    if quantity_name in RIG_QUANTITY_BY_AXIS_NAME:
+        quantity = RIG_QUANTITY_BY_AXIS_NAME[quantity_name]
         rig = replace(
             rig,
             **{quantity: convert_rig_value_and_warn_if_unusual(quantity, value, rig.normal_stress)},
@@ -326,7 +332,7 @@ def replace_rig_quantity(
     return rig, changed
 
 
-def scale_factors_of_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
+def compute_scale_factors_of_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
     """Compute the SI values of the dimensionless units of a rig.
 
     Parameters
@@ -378,6 +384,6 @@ def group_axis_rows_by_field_names(axes: Sequence[Axis]) -> Iterator[tuple[np.nd
     tuple of ndarray of int
         Indices of the points on each axis, for one combination of groups.
     """
-    every = [axis.classify_rows() for axis in axes]
+    every = [axis.group_rows_by_scene_parts() for axis in axes]
     for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
         yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))

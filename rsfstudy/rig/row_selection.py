@@ -15,19 +15,19 @@ from rsfstudy.rig.columns import Column
 from rsfstudy.rig.units import (
     compute_conversion_factor,
     convert_to_si,
-    find_size_of_units,
+    find_si_factor_and_exponents,
     split_number_and_units,
 )
 
 #: Columns that may limit the rows, indexed by the exponents of their units (see the module
 #: ``units``).
-_COLUMN_BY_EXPONENTS: Mapping[tuple[int, ...], str] = {
+_COLUMN_BY_BASE_UNIT_EXPONENTS: Mapping[tuple[int, ...], str] = {
     (0, 0, 1, 0, 0): "time",
     (0, 1, 0, 0, 0): "displacement",
 }
-_REMEDY_FOR_LIMITS = "Pass, for example, '100 s' or '2 mm', or a number in s."
+_REMEDY_FOR_INVALID_ROW_LIMIT = "Pass, for example, '100 s' or '2 mm', or a number in s."
 #: Default units of columns without units.
-_DEFAULT_UNITS = {"time": "s", "displacement": "um", "slip": "um"}
+_DEFAULT_UNITS_BY_COLUMN = {"time": "s", "displacement": "um", "slip": "um"}
 
 
 @dataclass(frozen=True)
@@ -61,14 +61,16 @@ class RowSelection:
 
     def __post_init__(self) -> None:
         """Check the row numbers and the thinning."""
-        if self.rows is not None and not _are_row_numbers(self.rows):
+        if self.rows is not None and not _is_pair_of_row_numbers(self.rows):
             rule = "must be the numbers of the first and the last row, counted from 1"
             raise InvalidValue("rows", self.rows, rule, remedy="Pass, for example, rows=(1, 5000).")
         if not isinstance(self.thin, int) or isinstance(self.thin, bool) or self.thin < 1:
             raise InvalidValue("thin", self.thin, "must be a whole number, 1 or more")
         parse_filter(self.filter)
 
-    def cut(self, columns: Mapping[str, Column]) -> tuple[dict[str, Column], list[str]]:
+    def keep_selected_rows(
+        self, columns: Mapping[str, Column]
+    ) -> tuple[dict[str, Column], list[str]]:
         """Select the rows between the limits.
 
         Parameters
@@ -92,9 +94,9 @@ class RowSelection:
         first, last = (1, count) if self.rows is None else (self.rows[0], min(self.rows[1], count))
         first -= 1
         if self.begin is not None:
-            first = max(first, self._find_row("begin", self.begin, columns))
+            first = max(first, self._find_row_index_of_limit("begin", self.begin, columns))
         if self.end is not None:
-            last = min(last, self._find_row("end", self.end, columns))
+            last = min(last, self._find_row_index_of_limit("end", self.end, columns))
         if first >= last:
             stated = {"rows": self.rows, "begin": self.begin, "end": self.end}
             rule = f"must contain at least one of the {count:,} rows of the record"
@@ -108,42 +110,52 @@ class RowSelection:
         }
         return cut, [f"rows {first + 1} to {last} of {count}"]
 
-    def _find_row(self, name: str, limit: Any, columns: Mapping[str, Column]) -> int:
+    def _find_row_index_of_limit(
+        self, limit_name: str, limit: Any, columns: Mapping[str, Column]
+    ) -> int:
         """Convert a limit to the index of the first row, or to the end index."""
         if isinstance(limit, bool) or not isinstance(limit, int | float | str):
             raise InvalidValue(
-                name, limit, "is neither a time nor a displacement", remedy=_REMEDY_FOR_LIMITS
+                limit_name,
+                limit,
+                "is neither a time nor a displacement",
+                remedy=_REMEDY_FOR_INVALID_ROW_LIMIT,
             )
         text = limit if isinstance(limit, str) else f"{limit!r} s"
-        size = find_size_of_units(split_number_and_units(text)[1])
-        key = _COLUMN_BY_EXPONENTS.get(size[1]) if size else None
+        size = find_si_factor_and_exponents(split_number_and_units(text)[1])
+        key = _COLUMN_BY_BASE_UNIT_EXPONENTS.get(size[1]) if size else None
         if key is None:
             raise InvalidValue(
-                name, limit, "is neither a time nor a displacement", remedy=_REMEDY_FOR_LIMITS
+                limit_name,
+                limit,
+                "is neither a time nor a displacement",
+                remedy=_REMEDY_FOR_INVALID_ROW_LIMIT,
             )
         if key == "displacement" and key not in columns:
             key = "slip"
         if key not in columns:
             rule = f"requires the column {key.replace('slip', 'displacement')}"
             raise InvalidValue(
-                name, limit, rule, remedy="To select rows by number, pass rows=(first, last)."
+                limit_name, limit, rule, remedy="To select rows by number, pass rows=(first, last)."
             )
         column = columns[key]
         si = "s" if key == "time" else "m"
-        units = column.units or _DEFAULT_UNITS[key]
-        value = convert_to_si(name, text, si) / float(compute_conversion_factor(key, units, si))
-        inside = column.values >= value if name == "begin" else column.values <= value
+        units = column.units or _DEFAULT_UNITS_BY_COLUMN[key]
+        value = convert_to_si(limit_name, text, si) / float(
+            compute_conversion_factor(key, units, si)
+        )
+        inside = column.values >= value if limit_name == "begin" else column.values <= value
         if not inside.any():
             rule = (
                 f"is outside the record, which covers {column.values[0]:g} to "
                 f"{column.values[-1]:g} {units}"
             )
-            raise InvalidValue(name, limit, rule)
-        if name == "begin":
+            raise InvalidValue(limit_name, limit, rule)
+        if limit_name == "begin":
             return int(np.argmax(inside))
         return len(inside) - int(np.argmax(inside[::-1]))
 
-    def smooth(
+    def filter_and_thin_columns(
         self, columns: Mapping[str, np.ndarray], filtered_names: Sequence[str]
     ) -> tuple[dict[str, np.ndarray], list[str]]:
         """Filter friction or stress, and keep every ``thin``-th row.
@@ -187,7 +199,7 @@ class RowSelection:
         return found, processing
 
 
-def _are_row_numbers(rows: Any) -> bool:
+def _is_pair_of_row_numbers(rows: Any) -> bool:
     """Return True if a value is a pair of increasing positive integers."""
     if not isinstance(rows, list | tuple) or len(rows) != 2:
         return False
@@ -195,7 +207,7 @@ def _are_row_numbers(rows: Any) -> bool:
     return is_integer and 1 <= rows[0] <= rows[1]
 
 
-def parse_filter(text: str) -> Filter | None:
+def parse_filter(filter_text: str) -> Filter | None:
     """Create a filter from a string with units.
 
     Parameters
@@ -214,18 +226,20 @@ def parse_filter(text: str) -> Filter | None:
     InvalidValue
         If the kind is unknown, or if the units are not units of time or frequency.
     """
-    if not text:
+    if not filter_text:
         return None
-    kind, _, size = str(text).partition(" ")
+    kind, _, size = str(filter_text).partition(" ")
     if kind not in FILTER_KINDS:
         remedy = "Pass, for example, 'mean 1 s' or 'butterworth_2 2 Hz'."
-        raise InvalidValue("filter", text, "is unknown", choices=FILTER_KINDS, remedy=remedy)
+        raise InvalidValue("filter", filter_text, "is unknown", choices=FILTER_KINDS, remedy=remedy)
     if not size:
         what = "a corner frequency" if kind in LOW_PASS_ORDERS else "an averaging time"
         example = "2 Hz" if kind in LOW_PASS_ORDERS else "1 s"
         rule = f"must contain {what} after the filter type"
-        raise InvalidValue("filter", text, rule, remedy=f"Pass, for example, '{kind} {example}'.")
+        raise InvalidValue(
+            "filter", filter_text, rule, remedy=f"Pass, for example, '{kind} {example}'."
+        )
     number = convert_to_si("filter", size, "1/s" if kind in LOW_PASS_ORDERS else "s")
     if not 0.0 < number < math.inf:
-        raise InvalidValue("filter", text, "must have a positive size")
+        raise InvalidValue("filter", filter_text, "must have a positive size")
     return Filter(kind, number)

@@ -13,15 +13,20 @@ from rsfstudy._deprecation import build_getattr_for_former_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import split_heading_into_name_and_units
-from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column, ColumnSpec, parse_column_spec
-from rsfstudy.rig.readers import read_source
-from rsfstudy.rig.readers.source import Table
+from rsfstudy.rig.columns import (
+    EXAMPLE_OF_TABLE_HEADER,
+    Column,
+    ColumnSelection,
+    parse_column_selection,
+)
+from rsfstudy.rig.readers import read_table_from_source
+from rsfstudy.rig.readers.source import SourceTable
 
 __getattr__ = build_getattr_for_former_names(__name__)
 
 #: Function that selects columns of a file. The two arguments of the function are a list of headings
 #: and a description of the location of the headings.
-ColumnChoosingFunction = Callable[[list[str], str], dict[str, ColumnSpec]]
+ColumnChoosingFunction = Callable[[list[str], str], dict[str, ColumnSelection]]
 
 
 @error_boundary
@@ -74,15 +79,15 @@ def read_table(
     >>> table["distance"].units
     'um'
     """
-    table = read_source(path, decimal=decimal)
+    table = read_table_from_source(path, decimal_separator=decimal)
     headings = dict.fromkeys(table.headings)
     wanted: Any
     if isinstance(columns, Mapping):
-        wanted = {name: parse_column_spec(told, headings) for name, told in columns.items()}
+        wanted = {name: parse_column_selection(told, headings) for name, told in columns.items()}
     elif columns is None:
         wanted = _choose_all_columns_of_header(table)
     else:
-        wanted = columns([*table.headings], table.location)
+        wanted = columns([*table.headings], table.heading_location)
     if not isinstance(wanted, Mapping):
         rule = "must be a mapping, or a function that returns one"
         raise InvalidValue("columns", columns, rule)
@@ -90,16 +95,16 @@ def read_table(
 
 
 def _choose_all_columns_of_header(
-    table: Table,
-) -> dict[str, ColumnSpec]:
+    table: SourceTable,
+) -> dict[str, ColumnSelection]:
     """Select all columns of a file whose header contains names and units."""
-    found: dict[str, ColumnSpec] = {}
+    found: dict[str, ColumnSelection] = {}
     if not table.has_headings:
         remedy = (
             "Add a first line with a heading for each column. In each heading, write the "
             f"units in parentheses after the name, for example {EXAMPLE_OF_TABLE_HEADER}."
         )
-        raise InvalidValue("table", table.location, "has no header", remedy=remedy)
+        raise InvalidValue("table", table.heading_location, "has no header", remedy=remedy)
     for n, heading in enumerate(table.headings, start=1):
         stated = split_heading_into_name_and_units(heading)
         if stated is None:
@@ -109,12 +114,12 @@ def _choose_all_columns_of_header(
             )
             rule = "does not consist of a name and units"
             raise InvalidValue("heading", heading, rule, remedy=remedy).with_location(
-                f"{table.location}, column {n}"
+                f"{table.heading_location}, column {n}"
             )
         name, units = stated
         if name in found:
             raise InvalidValue("column", name, "occurs twice in the header").with_location(
-                table.location
+                table.heading_location
             )
-        found[name] = ColumnSpec(heading, units)
+        found[name] = ColumnSelection(heading, units)
     return found

@@ -21,7 +21,7 @@ from rsfstudy.axes import Axis
 from rsfstudy.errors import InvalidValue
 
 #: Conversion factor to SI units, and the exponents of kilogram, metre, second, kelvin and mole.
-SiFactorAndExponents = tuple[Fraction, tuple[int, ...]]
+SiFactorAndBaseUnitExponents = tuple[Fraction, tuple[int, ...]]
 
 _STRESS_EXPONENTS, _FORCE_EXPONENTS, _ENERGY_EXPONENTS = (
     (1, -1, -2, 0, 0),
@@ -54,7 +54,7 @@ _SI_FACTOR_AND_EXPONENTS_BY_UNIT: Mapping[str, tuple[str | int, tuple[int, ...]]
     "K": (1, (0, 0, 0, 1, 0)),
     "mol": (1, (0, 0, 0, 0, 1)),
 }
-_KNOWN_UNITS: Mapping[str, SiFactorAndExponents] = {
+_EXACT_FACTOR_AND_EXPONENTS_BY_UNIT: Mapping[str, SiFactorAndBaseUnitExponents] = {
     name: (Fraction(size), of) for name, (size, of) in _SI_FACTOR_AND_EXPONENTS_BY_UNIT.items()
 }
 _NUMBER_PATTERN = re.compile(
@@ -113,7 +113,7 @@ def split_number_and_units(text: str) -> tuple[float | None, str]:
     return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
 
 
-def convert_to_si(quantity_name: str, value: Any, units: str) -> float:
+def convert_to_si(quantity_name: str, value: Any, si_units: str) -> float:
     """Convert a quantity to SI units.
 
     Parameters
@@ -136,10 +136,10 @@ def convert_to_si(quantity_name: str, value: Any, units: str) -> float:
     InvalidValue
         If the value is not a finite number, or if its units are unknown or incompatible.
     """
-    return float(convert_to_si_as_fraction(quantity_name, value, units))
+    return float(convert_to_si_as_fraction(quantity_name, value, si_units))
 
 
-def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fraction:
+def convert_to_si_as_fraction(quantity_name: str, value: Any, si_units: str) -> Fraction:
     """Convert a quantity to an exact fraction in SI units.
 
     Parameters
@@ -162,17 +162,17 @@ def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fra
         If the value is not a finite number, or if its units are unknown or incompatible.
     """
     if isinstance(value, str):
-        found: Any = _parse_quantity(quantity_name, value, units)
+        found: Any = _convert_quantity_text_to_si(quantity_name, value, si_units)
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
-        found = _convert_pint_quantity(quantity_name, value, value, units)
+        found = _convert_pint_quantity_to_si(quantity_name, value, value, si_units)
     else:
         found = Axis.to_plain_value(quantity_name, value)
     if isinstance(found, bool) or not isinstance(found, int | float | Fraction):
-        remedy = f"Pass a number in {units}, or a string with units."
+        remedy = f"Pass a number in {si_units}, or a string with units."
         raise InvalidValue(quantity_name, value, "is not a quantity", remedy=remedy)
-    if isinstance(value, int) and math.isinf(_to_float(found)):
+    if isinstance(value, int) and math.isinf(_convert_to_float_or_infinity(found)):
         raise InvalidValue(quantity_name, value, "is too large for a floating-point number")
-    if not math.isfinite(_to_float(found)):
+    if not math.isfinite(_convert_to_float_or_infinity(found)):
         raise InvalidValue(quantity_name, value, "must be finite")
     return Fraction(found)
 
@@ -227,58 +227,58 @@ def multiply_by_exact_fraction(values: Any, factor: Fraction) -> Any:
             places
         ].reshape(values.shape)
     return (
-        _to_float(_fraction_of_shortest_digits(values) * factor)
+        _convert_to_float_or_infinity(_convert_shortest_decimal_to_fraction(values) * factor)
         if math.isfinite(values)
         else values
     )
 
 
-def _fraction_of_shortest_digits(number: float) -> Fraction:
+def _convert_shortest_decimal_to_fraction(number: float) -> Fraction:
     """Return the shortest decimal fraction that rounds to a number."""
     return Fraction(repr(float(number)))
 
 
-def _to_float(number: Fraction | float) -> float:
+def _convert_to_float_or_infinity(number: Fraction | float) -> float:
     try:
         return float(number)
     except OverflowError:
         return math.inf
 
 
-def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | float:
+def _convert_quantity_text_to_si(quantity_name: str, text: str, si_units: str) -> Fraction | float:
     """Convert a string with a number and units to SI units.
 
     Infinite numbers and NaN are returned unchanged.
     """
     if len(text) > _MAX_QUANTITY_TEXT_LENGTH:
         rule = f"is not a quantity, because it has more than {_MAX_QUANTITY_TEXT_LENGTH} characters"
-        remedy = f"Write a number and its units, for example '2.5 {units.removesuffix('1')}'."
+        remedy = f"Write a number and its units, for example '2.5 {si_units.removesuffix('1')}'."
         raise InvalidValue(quantity_name, text, rule, remedy=remedy)
     match = _NUMBER_PATTERN.match(text.strip())
     powers = _parse_unit_powers(text.strip()[match.end() :].strip()) if match else None
     if match is None or powers is None:
-        example = f"2.5 {units}".removesuffix(" 1")
-        units_hint = "" if units == "1" else ", followed by its units"
+        example = f"2.5 {si_units}".removesuffix(" 1")
+        units_hint = "" if si_units == "1" else ", followed by its units"
         remedy = f"Write a number with a decimal point{units_hint}, for example '{example}'."
         raise InvalidValue(quantity_name, text, "is not a quantity", remedy=remedy)
     number = float(match[0])
     if not math.isfinite(number):
         return number
-    stated = _fraction_of_shortest_digits(number)
-    if not all(unit in _KNOWN_UNITS for unit, _power in powers):
-        size = _compute_factor_with_pint(quantity_name, text, powers, units)
+    stated = _convert_shortest_decimal_to_fraction(number)
+    if not all(unit in _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT for unit, _power in powers):
+        size = _compute_factor_with_pint(quantity_name, text, powers, si_units)
         return stated * Fraction(size) if math.isfinite(size) else size
-    scale, exponents = _multiply_known_units(powers)
-    wanted = _multiply_known_units(_parse_unit_powers(units.removeprefix("1")) or [])[1]
+    scale, exponents = _compute_factor_of_known_units(powers)
+    wanted = _compute_factor_of_known_units(_parse_unit_powers(si_units.removeprefix("1")) or [])[1]
     if exponents == (wanted[0], wanted[1] + 2, *wanted[2:]):
         rule = "must be a stress, not a force"
         raise InvalidValue(quantity_name, text, rule, remedy="Divide the force by the fault area.")
     if exponents != wanted:
-        raise _incompatible_units_error(quantity_name, text, units)
+        raise _build_incompatible_units_error(quantity_name, text, si_units)
     return stated * scale
 
 
-def _incompatible_units_error(quantity_name: str, value: Any, units: str) -> InvalidValue:
+def _build_incompatible_units_error(quantity_name: str, value: Any, units: str) -> InvalidValue:
     if units == "1":
         return InvalidValue(quantity_name, value, "must be a number without units")
     if isinstance(value, str) and not value.strip(" 0123456789.+-"):
@@ -299,24 +299,28 @@ def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
     return [(name, int(power or 1) * (-1 if over else 1)) for over, name, power in found]
 
 
-def _multiply_known_units(units_and_powers: Iterable[tuple[str, int]]) -> SiFactorAndExponents:
+def _compute_factor_of_known_units(
+    units_and_powers: Iterable[tuple[str, int]],
+) -> SiFactorAndBaseUnitExponents:
     """Multiply powers of units that are known without pint."""
     scale, exponents = Fraction(1), [0] * 5
     for name, power in units_and_powers:
-        size, of = _KNOWN_UNITS[name]
+        size, of = _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT[name]
         scale *= size**power
         exponents = [e + power * o for e, o in zip(exponents, of, strict=True)]
     return scale, tuple(exponents)
 
 
 def _compute_factor_with_pint(
-    quantity_name: str, text: str, units_and_powers: Iterable[tuple[str, int]], units: str
+    quantity_name: str, text: str, units_and_powers: Iterable[tuple[str, int]], si_units: str
 ) -> float:
     try:
         pint = importlib.import_module("pint")
     except ImportError as error:
-        usual = ", ".join(n for n in _KNOWN_UNITS if n != "kg" and n.isascii())
-        remedy = f"{_PINT_INSTALL_ADVICE}, use the units {usual}, or pass a number in {units}."
+        usual = ", ".join(
+            n for n in _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT if n != "kg" and n.isascii()
+        )
+        remedy = f"{_PINT_INSTALL_ADVICE}, use the units {usual}, or pass a number in {si_units}."
         remedy = _suggest_unit_with_other_capitals(units_and_powers) or remedy
         raise InvalidValue(
             quantity_name,
@@ -330,35 +334,46 @@ def _compute_factor_with_pint(
     except Exception as error:  # Both pint and the Python parser may raise errors of other types.
         remedy = (
             _suggest_unit_with_other_capitals(units_and_powers)
-            or f"Write, for example, '2.5 {units}'."
+            or f"Write, for example, '2.5 {si_units}'."
         )
         rule = f"has units that are unknown to the library pint ({error})"
         raise InvalidValue(quantity_name, text, rule, remedy=remedy) from error
     # Zero does not convert to zero if the unit is logarithmic or has an offset.
-    if _convert_pint_quantity(quantity_name, text, registry.Quantity(0.0, unit), units) != 0.0:
-        raise _incompatible_units_error(quantity_name, text, units)
-    return float(_convert_pint_quantity(quantity_name, text, registry.Quantity(1.0, unit), units))
+    if (
+        _convert_pint_quantity_to_si(quantity_name, text, registry.Quantity(0.0, unit), si_units)
+        != 0.0
+    ):
+        raise _build_incompatible_units_error(quantity_name, text, si_units)
+    return float(
+        _convert_pint_quantity_to_si(quantity_name, text, registry.Quantity(1.0, unit), si_units)
+    )
 
 
 def _suggest_unit_with_other_capitals(units_and_powers: Iterable[tuple[str, int]]) -> str:
     """Suggest known units that differ from an unknown unit only in letter case."""
     for name, _power in units_and_powers:
-        meant = [known for known in _KNOWN_UNITS if known.lower() == name.lower() and known != name]
+        meant = [
+            known
+            for known in _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT
+            if known.lower() == name.lower() and known != name
+        ]
         if meant:
             return f"Did you mean {' or '.join(meant)} instead of {name}?"
     return ""
 
 
-def _convert_pint_quantity(quantity_name: str, value: Any, quantity: Any, units: str) -> Any:
+def _convert_pint_quantity_to_si(
+    quantity_name: str, value: Any, pint_quantity: Any, si_units: str
+) -> Any:
     """Return the value of a pint quantity in SI units."""
     try:
-        magnitude = quantity.to(units).magnitude
+        magnitude = pint_quantity.to(si_units).magnitude
     except Exception as error:
-        raise _incompatible_units_error(quantity_name, value, units) from error
+        raise _build_incompatible_units_error(quantity_name, value, si_units) from error
     return Axis.to_plain_value(quantity_name, magnitude)
 
 
-def find_size_of_units(units: str) -> SiFactorAndExponents | None:
+def find_si_factor_and_exponents(units: str) -> SiFactorAndBaseUnitExponents | None:
     """Return the conversion factor and the exponents of common units.
 
     Parameters
@@ -373,6 +388,8 @@ def find_size_of_units(units: str) -> SiFactorAndExponents | None:
         None if the string is not a product or quotient of known units.
     """
     powers = _parse_unit_powers(units) if 0 < len(units) <= _MAX_QUANTITY_TEXT_LENGTH else None
-    if not powers or not all(name in _KNOWN_UNITS for name, _power in powers):
+    if not powers or not all(
+        name in _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT for name, _power in powers
+    ):
         return None
-    return _multiply_known_units(powers)
+    return _compute_factor_of_known_units(powers)

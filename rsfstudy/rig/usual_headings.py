@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSpec, parse_column_spec
-from rsfstudy.rig.readers import read_source
-from rsfstudy.rig.readers.source import Table
+from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSelection, parse_column_selection
+from rsfstudy.rig.readers import read_table_from_source
+from rsfstudy.rig.readers.source import SourceTable
 from rsfstudy.rig.units import compute_conversion_factor
 
 #: SI units of the columns of a record, and factors from SI units to the units of `Record`.
-UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
+SI_UNITS_AND_FACTOR_BY_RECORD_COLUMN = {
     "time": ("s", 1.0),
     "displacement": ("m", 1e6),
     "slip": ("m", 1e6),
@@ -29,18 +29,18 @@ UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
     "pore_pressure": ("Pa", 1.0),
 }
 #: Units of columns in the examples of error messages. Columns that are not listed are in MPa.
-_USUAL_UNITS = {"time": "s", "displacement": "um", "slip": "um", "velocity": "um/s"}
+_EXAMPLE_UNITS_BY_COLUMN = {"time": "s", "displacement": "um", "slip": "um", "velocity": "um/s"}
 #: Spellings of the unit of dimensionless columns.
-_NO_UNITS = ("1", "-", ".", "none")
+_SPELLINGS_OF_DIMENSIONLESS_UNIT = ("1", "-", ".", "none")
 #: Columns that can replace a column, indexed by the name of the replaced column.
-_ALTERNATIVES = {
+_ALTERNATIVE_COLUMN_BY_COLUMN = {
     "displacement": "slip",
     "slip": "displacement",
     "friction": "shear_stress",
     "shear_stress": "friction",
 }
 #: Patterns that match the start of common headings, indexed by column name.
-_PATTERNS_OF_USUAL_HEADINGS = {
+_COMMON_HEADING_PATTERN_BY_COLUMN = {
     "time": r"t(ime)?\b|time|zeit|temps|tiempo|tempo",
     "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
     "slip": r"(fault.*)?slip",
@@ -67,11 +67,11 @@ class UsableColumns(NamedTuple):
         ``shear_stress``.
     """
 
-    names: tuple[str, ...]
+    column_names: tuple[str, ...]
     shear_stress_suffices: bool = False
 
 
-def find_factor_to_record_units(column_name: str, units: str) -> float:
+def compute_factor_to_record_units(column_name: str, units: str) -> float:
     """Compute the factor that converts a column to the units of `Record`.
 
     Parameters
@@ -91,16 +91,16 @@ def find_factor_to_record_units(column_name: str, units: str) -> float:
     InvalidValue
         If the units are not compatible with the column.
     """
-    si, ours = UNITS_AND_FACTORS_OF_RECORD_COLUMNS[column_name]
+    si, ours = SI_UNITS_AND_FACTOR_BY_RECORD_COLUMN[column_name]
     if not units:
         return {"Pa": 1e6}.get(si, 1.0)
-    if si == "1" and units in _NO_UNITS:
+    if si == "1" and units in _SPELLINGS_OF_DIMENSIONLESS_UNIT:
         return 1.0
     return float(compute_conversion_factor(column_name, units, si)) * ours
 
 
 def read_selected_columns(
-    table: Table, selected_columns: Mapping[str, Any] | None, usable: UsableColumns
+    table: SourceTable, selected_columns: Mapping[str, Any] | None, usable_columns: UsableColumns
 ) -> dict[str, Column]:
     """Read the selected columns, and usable columns with common headings.
 
@@ -126,22 +126,22 @@ def read_selected_columns(
         several columns match the same usable column, or if a column has no units.
     """
     for name in selected_columns or ():
-        _check_column_name(name, usable.names)
-    if selected_columns is None and table.has_only_columns:
+        _check_column_name_is_known(name, usable_columns.column_names)
+    if selected_columns is None and table.headings_are_column_names:
         for name in table.headings:
-            _check_column_name(name, usable.names)
-        return {name: table.read_column(name, ColumnSpec(name)) for name in table.headings}
+            _check_column_name_is_known(name, usable_columns.column_names)
+        return {name: table.read_column(name, ColumnSelection(name)) for name in table.headings}
     found = dict(selected_columns or {})
     # If the user selects a column of friction or shear stress, the column of normal stress is used
     # only if the user selects it too.
     has_stress = not {"friction", "shear_stress"}.isdisjoint(found)
-    for name in usable.names if table.has_headings else ():
+    for name in usable_columns.column_names if table.has_headings else ():
         if name == "normal_stress" and (
-            has_stress or (usable.shear_stress_suffices and "shear_stress" in found)
+            has_stress or (usable_columns.shear_stress_suffices and "shear_stress" in found)
         ):
             continue
-        if name not in found and _ALTERNATIVES.get(name) not in found:
-            found |= _find_usual_heading(name, table)
+        if name not in found and _ALTERNATIVE_COLUMN_BY_COLUMN.get(name) not in found:
+            found |= _find_column_with_common_heading(name, table)
     headings = dict.fromkeys(table.headings)
     return {
         name: _read_column_with_units(table, name, selection, headings)
@@ -149,33 +149,35 @@ def read_selected_columns(
     }
 
 
-def _check_column_name(column_name: str, known_names: Sequence[str]) -> None:
+def _check_column_name_is_known(column_name: str, known_names: Sequence[str]) -> None:
     if column_name not in known_names:
         raise InvalidValue("column", column_name, "is unknown", choices=known_names)
 
 
 def _read_column_with_units(
-    table: Table, name: str, selection: Any, headings: Mapping[str, Any]
+    table: SourceTable, column_name: str, selection: Any, headings: Mapping[str, Any]
 ) -> Column:
     """Read a column, and check that it has units.
 
     The units of friction may be omitted, but the units of other columns are required.
     """
-    spec = parse_column_spec(selection, headings)
-    index = table.find_column(spec.heading)
-    stated = spec.units or table.units_of_heading(index)
-    if not (stated or table.default_units or name == "friction") and isinstance(selection, str):
-        column = table.read_column(name, spec)
+    spec = parse_column_selection(selection, headings)
+    index = table.find_column_index(spec.heading)
+    stated = spec.units or table.parse_units_of_heading(index)
+    if not (stated or table.uses_default_units or column_name == "friction") and isinstance(
+        selection, str
+    ):
+        column = table.read_column(column_name, spec)
         if column.units:  # The type of the values implies the units.
             return column
-        whole = f"{spec.heading} ({_USUAL_UNITS.get(name, 'MPa')})"
+        whole = f"{spec.heading} ({_EXAMPLE_UNITS_BY_COLUMN.get(column_name, 'MPa')})"
         remedy = (
             f"In the file, add the units in parentheses to the heading, for example {whole}. "
-            f"Alternatively, pass --columns '{name}={whole},...' "
+            f"Alternatively, pass --columns '{column_name}={whole},...' "
         )
-        remedy += f"(columns={{'{name}': '{whole}', ...}})."
+        remedy += f"(columns={{'{column_name}': '{whole}', ...}})."
         raise InvalidValue("heading", selection, "has no units", remedy=remedy)
-    return table.read_column(name, spec)
+    return table.read_column(column_name, spec)
 
 
 def has_time_column(source: Any) -> bool:
@@ -191,10 +193,10 @@ def has_time_column(source: Any) -> bool:
     bool
         True if the table is a record. A protocol contains durations or distances instead of times.
     """
-    return bool(_find_usual_heading("time", read_source(source)))
+    return bool(_find_column_with_common_heading("time", read_table_from_source(source)))
 
 
-def _find_usual_heading(column_name: str, table: Table) -> dict[str, str]:
+def _find_column_with_common_heading(column_name: str, table: SourceTable) -> dict[str, str]:
     """Find the column with a common heading for a quantity.
 
     If several headings match, headings with compatible units take precedence. Among headings with
@@ -205,7 +207,7 @@ def _find_usual_heading(column_name: str, table: Table) -> dict[str, str]:
     meant = [
         text
         for text, m in parts.items()
-        if re.match(_PATTERNS_OF_USUAL_HEADINGS[column_name], m[1], re.IGNORECASE)
+        if re.match(_COMMON_HEADING_PATTERN_BY_COLUMN[column_name], m[1], re.IGNORECASE)
     ]
     meant = [
         text for text in meant if _has_compatible_units(column_name, parts[text][2] or "")
@@ -218,7 +220,7 @@ def _find_usual_heading(column_name: str, table: Table) -> dict[str, str]:
         )
         rule = "matches several columns"
         raise InvalidValue("column", column_name, rule, choices=meant, remedy=remedy).with_location(
-            table.location
+            table.heading_location
         )
     return {column_name: meant[0]} if meant else {}
 
@@ -226,12 +228,12 @@ def _find_usual_heading(column_name: str, table: Table) -> dict[str, str]:
 def _has_compatible_units(column_name: str, units: str) -> bool:
     """Return True if the units are compatible with the quantity of a column."""
     try:
-        return find_factor_to_record_units(column_name, units) > 0.0
+        return compute_factor_to_record_units(column_name, units) > 0.0
     except InvalidValue:
         return False
 
 
-def missing_columns_error(table: Table, rule: str) -> InvalidValue:
+def build_missing_columns_error(table: SourceTable, rule: str) -> InvalidValue:
     """Return the error for a table without the required columns.
 
     Parameters
@@ -259,10 +261,10 @@ def missing_columns_error(table: Table, rule: str) -> InvalidValue:
     if not table.has_headings:
         rule = f"has no headings, and {rule}"
         header = f"{len(table.headings)} columns without headings"
-    return InvalidValue("header", header, rule, remedy=remedy).with_location(table.location)
+    return InvalidValue("header", header, rule, remedy=remedy).with_location(table.heading_location)
 
 
-def check_finite(columns: Mapping[str, Column]) -> None:
+def check_column_values_are_finite(columns: Mapping[str, Column]) -> None:
     """Raise an error for the first value that is not finite.
 
     Parameters
@@ -276,4 +278,6 @@ def check_finite(columns: Mapping[str, Column]) -> None:
         If a value is not finite. The error message contains the location of the value.
     """
     for name, column in columns.items():
-        column.check_values(name, ~np.isfinite(column.values), "must be a finite number")
+        column.raise_for_invalid_values(
+            name, ~np.isfinite(column.values), "must be a finite number"
+        )

@@ -61,16 +61,16 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 if TYPE_CHECKING:
     from rsfstudy.slider.closed_forms import (
         CLOSED_FORMS,
-        effective_friction,
+        compute_effective_friction,
     )
     from rsfstudy.slider.closed_forms import (
-        critical_stiffness as critical_stiffness_closed_form,
+        compute_critical_stiffness as critical_stiffness_closed_form,
     )
     from rsfstudy.slider.dynamics.inertia import NEGLIGIBLE_SECOND_ORDER_WEIGHT
     from rsfstudy.slider.equations import (
-        Equations,
+        EquationsOfMotion,
     )
-    from rsfstudy.slider.fluid import BUILT_IN_PARTS
+    from rsfstudy.slider.fluid import BUILT_IN_FLUID_CLASS_BY_NAME
     from rsfstudy.slider.friction import (
         FrictionFunctions,
     )
@@ -80,12 +80,12 @@ if TYPE_CHECKING:
         UserPart,
     )
     from rsfstudy.slider.parts import (
-        Function,
-        Numbers,
+        FloatTuple,
+        NumericFunction,
     )
     from rsfstudy.slider.path_length import (
         LOG_SLIP_RATE_PER_PATH_LENGTH,
-        displacement_per_path_length,
+        compute_displacement_per_path_length,
     )
     from rsfstudy.slider.sampled_loading import (
         SampledHistory,
@@ -142,15 +142,15 @@ else:
 
 __all__ = [
     "SceneFields",
-    "BUILT_IN_PARTS",
+    "BUILT_IN_FLUID_CLASS_BY_NAME",
     "CLOSED_FORMS",
     "SINGLE_ENDLESS_SEGMENT_TABLE",
-    "Equations",
+    "EquationsOfMotion",
     "FrictionFunctions",
-    "Function",
+    "NumericFunction",
     "MIN_SEGMENT_DURATION",
     "NEGLIGIBLE_SECOND_ORDER_WEIGHT",
-    "Numbers",
+    "FloatTuple",
     "LOG_SLIP_RATE_PER_PATH_LENGTH",
     "MotionPoint",
     "Protocol",
@@ -165,8 +165,8 @@ __all__ = [
     "cached_attribute",
     "cached_per_scene",
     "critical_stiffness_closed_form",
-    "effective_friction",
-    "displacement_per_path_length",
+    "compute_effective_friction",
+    "compute_displacement_per_path_length",
     "protocol",
     "replace_field_values",
 ]

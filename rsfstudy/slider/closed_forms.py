@@ -32,13 +32,13 @@ class ClosedForm:
         Reference for the formula.
     """
 
-    formula: str
+    formula_text: str
     scene_field_names: tuple[str, ...]
-    function: Callable[..., float]
+    formula_function: Callable[..., float]
     literature_citation: str
 
 
-def critical_stiffness(
+def compute_critical_stiffness(
     log_slip_rate: float, mu_star: float, a: float, b: float, cot_phi: float, alpha: float
 ) -> float:
     r"""Compute the critical stiffness without inertia in closed form.
@@ -82,7 +82,7 @@ def critical_stiffness(
     return above / ((1.0 - mu_ss * cot_phi) * (1.0 - (mu_ss - alpha) * cot_phi))
 
 
-def critical_displacement_step(
+def compute_critical_displacement_step(
     b_over_a: float, law_exponent: float = 0.0, stiffness_ratio: float = 0.0
 ) -> float:
     r"""Compute the critical displacement step for the slip-to-slowness laws.
@@ -125,7 +125,7 @@ def critical_displacement_step(
     return longer / (b_over_a - 1.0)
 
 
-def critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -> float:
+def compute_critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -> float:
     r"""Compute the critical velocity step at the critical stiffness.
 
     Parameters
@@ -161,7 +161,7 @@ def critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -> float:
     return 1.0 + 1.0 / ((1.0 - law_exponent) * (b_over_a - 1.0))
 
 
-def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
+def compute_effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
     r"""Compute the effective friction coefficient for Coulomb stress changes.
 
     Parameters
@@ -249,7 +249,7 @@ def steady_state_offset_after_normal_stress_fall(
     return (mu_star * (normal_stress_ratio - 1.0) - taken) / a
 
 
-def critical_normal_stress_step(
+def compute_critical_normal_stress_step(
     mu_star: float,
     a: float,
     b_over_a: float,
@@ -312,7 +312,7 @@ CLOSED_FORMS: Mapping[str, ClosedForm] = {
     "velocity_step_at_critical_stiffness": ClosedForm(
         "V_0/V_* = 1 + a/(b-a)",
         ("b_over_a",),
-        critical_velocity_step,
+        compute_critical_velocity_step,
         "Gu et al. (1984), slip law, constant normal stress, k = k_cr",
     ),
     "velocity_step_for_b_over_a_of_e": ClosedForm(
@@ -324,19 +324,19 @@ CLOSED_FORMS: Mapping[str, ClosedForm] = {
     "displacement_step": ClosedForm(
         "D_c a/(b-a)",
         ("b_over_a",),
-        critical_displacement_step,
+        compute_critical_displacement_step,
         "Gu et al. (1984), slip law, constant normal stress, load point held",
     ),
     "displacement_step_of_the_family": ClosedForm(
         "D_c a/(b-a) [-ln(1 - eps k/k_cr)]/(eps k/k_cr)",
         ("b_over_a", "law_exponent", "stiffness_ratio"),
-        critical_displacement_step,
+        compute_critical_displacement_step,
         "h(u*) = -k/k_cr, constant normal stress, load point held, infinite norm",
     ),
     "velocity_step_of_the_family": ClosedForm(
         "V_0/V_* = 1 + a/[(1 - eps)(b-a)]",
         ("b_over_a", "law_exponent"),
-        critical_velocity_step,
+        compute_critical_velocity_step,
         "invariant line of the orbits at k = k_cr, constant normal stress, infinite norm; eps = 0 "
         "is that of Gu et al. (1984)",
     ),

@@ -14,7 +14,7 @@ from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.motion_point import MotionPoint
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 from rsfstudy.slider.point_functions import (
     build_point_function_between_ruptures,
     build_point_function_in_rupture,
@@ -37,7 +37,7 @@ RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
 
 
 @add_former_member_names
-class Equations(NamedTuple):
+class EquationsOfMotion(NamedTuple):
     r"""Autonomous system of ordinary differential equations for a scene.
 
     The derivatives of the unknowns do not depend explicitly on the independent variable.
@@ -68,13 +68,13 @@ class Equations(NamedTuple):
     regime: str
     unknown_names: tuple[str, ...]
     unknown_scales: tuple[float, ...]
-    rate_function: Function
-    point_function: Function
-    parameters: Numbers
+    rate_function: NumericFunction
+    motion_point_function: NumericFunction
+    parameters: FloatTuple
     state_count: int = 1
-    force_balance_function: Function | None = None
+    force_balance_function: NumericFunction | None = None
 
-    def evaluate_rates(self, unknown_values: Numbers) -> Numbers:
+    def evaluate_rates(self, unknown_values: FloatTuple) -> FloatTuple:
         """Compute the derivatives of the unknowns.
 
         Parameters
@@ -97,7 +97,7 @@ class Equations(NamedTuple):
         """
         return self.regime == RIGID_REGIME
 
-    def evaluate_point(self, unknown_values: Numbers) -> MotionPoint:
+    def evaluate_motion_point(self, unknown_values: FloatTuple) -> MotionPoint:
         """Compute stress, slip rate and states from the values of the unknowns.
 
         Parameters
@@ -110,13 +110,13 @@ class Equations(NamedTuple):
         MotionPoint
             Stress, slip rate and states of the motion.
         """
-        return self.point_function(
+        return self.motion_point_function(
             unknown_values, self.rate_function(unknown_values, self.parameters), self.parameters
         )
 
 
 @cached_per_scene
-def equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Equations:
+def build_equations_between_ruptures(scene: SceneView, *, with_time: bool) -> EquationsOfMotion:
     """Return the equations of a scene between ruptures.
 
     Between ruptures, inertia has a small effect or no effect on the motion. The unknowns are the
@@ -134,11 +134,11 @@ def equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Equation
     Equations
         Equations with path length as the independent variable.
     """
-    return _build_slow_equations(scene, scene.dynamics, with_time=with_time)
+    return _build_equations_for_dynamics(scene, scene.dynamics, with_time=with_time)
 
 
 @cached_per_scene
-def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
+def build_equations_without_mass(scene: SceneView, *, with_time: bool) -> EquationsOfMotion:
     """Return the equations of a scene without inertia.
 
     Parameters
@@ -154,24 +154,26 @@ def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
         Quasi-static equations with path length as the independent variable.
     """
     if scene.dynamics.build_rupture_rate_function is None:
-        return equations_between_ruptures(scene, with_time=with_time)
-    return _build_slow_equations(scene, QuasiStatic(), with_time=with_time)
+        return build_equations_between_ruptures(scene, with_time=with_time)
+    return _build_equations_for_dynamics(scene, QuasiStatic(), with_time=with_time)
 
 
-def _build_slow_equations(
+def _build_equations_for_dynamics(
     scene: SceneView, dynamics: Dynamics, *, with_time: bool, along_path: bool = True
-) -> Equations:
+) -> EquationsOfMotion:
     """Build the equations between ruptures for the given dynamics."""
     friction = scene.friction_functions
-    balance, growth = _build_slip_rate_functions(friction, dynamics.build_slip_rate_functions)
+    balance, growth = _build_cached_slip_rate_functions(
+        friction, dynamics.build_slip_rate_functions
+    )
     by_displacement, by_path, by_path_with_time = build_rate_functions_between_ruptures(
         friction, balance, allows_reversed_slip=scene.parts.law.regularised
     )
-    unknowns = ("spring_stress", *_state_names(scene))
+    unknowns = ("spring_stress", *_list_state_names(scene))
     scales = (scene.a,) * len(unknowns)
     if with_time:
         unknowns, scales = (*unknowns, "time"), (*scales, 1.0)
-    return Equations(
+    return EquationsOfMotion(
         dynamics.regime,
         unknowns,
         scales,
@@ -184,15 +186,17 @@ def _build_slow_equations(
 
 
 @cache
-def _build_slip_rate_functions(
+def _build_cached_slip_rate_functions(
     friction_functions: FrictionFunctions,
-    build_slip_rate_functions: Callable[[FrictionFunctions], tuple[Function, Function]],
-) -> tuple[Function, Function]:
+    slip_rate_functions_builder: Callable[
+        [FrictionFunctions], tuple[NumericFunction, NumericFunction]
+    ],
+) -> tuple[NumericFunction, NumericFunction]:
     """Build and cache the force balance and the derivative of ln V."""
-    return build_slip_rate_functions(friction_functions)
+    return slip_rate_functions_builder(friction_functions)
 
 
-def _state_names(scene: SceneView) -> tuple[str, ...]:
+def _list_state_names(scene: SceneView) -> tuple[str, ...]:
     """Return the names of the states."""
     count = scene.parts.law.state_count
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
@@ -201,7 +205,7 @@ def _state_names(scene: SceneView) -> tuple[str, ...]:
 
 
 @cached_per_scene
-def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equations:
+def build_equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> EquationsOfMotion:
     r"""Return the equations of a scene with inertia.
 
     The unknowns are the spring stress f, the logarithm of the slip rate :math:`\ln(V/V_*)`, the
@@ -229,9 +233,9 @@ def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equati
 
 def _build_rupture_equations(
     scene: SceneView, *, with_time: bool = False, along_path: bool = True
-) -> Equations:
+) -> EquationsOfMotion:
     """Build the rupture equations. Raise TypeError if the scene has no inertia."""
-    a, friction, others = scene.a, scene.friction_functions, _state_names(scene)[1:]
+    a, friction, others = scene.a, scene.friction_functions, _list_state_names(scene)[1:]
     if scene.dynamics.build_rupture_rate_function is None:
         raise TypeError(
             f"the dynamics {scene.dynamics.name!r} do not define equations for ruptures"
@@ -243,7 +247,7 @@ def _build_rupture_equations(
     scales = (a, 1.0, a, *[a] * len(others))
     if with_time:
         unknowns, scales = (*unknowns, "time"), (*scales, 1.0)
-    return Equations(
+    return EquationsOfMotion(
         RUPTURE_REGIME,
         unknowns,
         scales,
@@ -254,7 +258,7 @@ def _build_rupture_equations(
     )
 
 
-def build_equations_against_displacement(scene: SceneView) -> Equations:
+def build_equations_against_displacement(scene: SceneView) -> EquationsOfMotion:
     """Return the equations between ruptures as functions of displacement.
 
     The independent variable is the sum of slip and load point displacement. Close to steady
@@ -272,10 +276,10 @@ def build_equations_against_displacement(scene: SceneView) -> Equations:
     Equations
         Equations with displacement as the independent variable.
     """
-    return _build_slow_equations(scene, scene.dynamics, with_time=False, along_path=False)
+    return _build_equations_for_dynamics(scene, scene.dynamics, with_time=False, along_path=False)
 
 
-def build_equations_against_inertial_time(scene: SceneView) -> Equations:
+def build_equations_against_inertial_time(scene: SceneView) -> EquationsOfMotion:
     r"""Return the equations with inertia and time as the independent variable.
 
     Parameters
@@ -296,7 +300,9 @@ def build_equations_against_inertial_time(scene: SceneView) -> Equations:
     return _build_rupture_equations(scene, along_path=False)
 
 
-def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Equations:
+def build_equations_at_imposed_slip_rate(
+    scene: SceneView, log_slip_rate: float
+) -> EquationsOfMotion:
     r"""Return the equations of a rigid slider at a prescribed slip rate.
 
     The unknowns are the frictional stress g and all states except the first. Slip is the
@@ -314,8 +320,8 @@ def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Eq
     Equations
         Equations whose last parameter is :math:`\ln(V/V_*)`.
     """
-    friction, unknowns = scene.friction_functions, ("friction", *_state_names(scene)[1:])
-    return Equations(
+    friction, unknowns = scene.friction_functions, ("friction", *_list_state_names(scene)[1:])
+    return EquationsOfMotion(
         RIGID_REGIME,
         unknowns,
         (scene.a,) * len(unknowns),
@@ -326,7 +332,9 @@ def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Eq
     )
 
 
-def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum: float) -> float:
+def compute_quasi_static_log_slip_rate(
+    scene: SceneView, spring_stress: float, state_sum: float
+) -> float:
     r"""Compute the slip rate from the spring stress and the state.
 
     The function ignores inertia and assumes that there is no pore pressure.
@@ -346,12 +354,14 @@ def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     """
     psis = (state_sum, *(0.0,) * (scene.state_count - 1))
-    balance = equations_without_mass(scene, with_time=False).force_balance_function
+    balance = build_equations_without_mass(scene, with_time=False).force_balance_function
     assert balance is not None
     return float(balance(spring_stress, psis, scene.parameter_values)[0])
 
 
-def slow_manifold_point(scene: SceneView, spring_stress: float, states: Numbers) -> MotionPoint:
+def compute_slow_manifold_point(
+    scene: SceneView, spring_stress: float, states: FloatTuple
+) -> MotionPoint:
     """Return the slow-manifold point for a given spring stress and given states.
 
     Parameters
@@ -368,6 +378,6 @@ def slow_manifold_point(scene: SceneView, spring_stress: float, states: Numbers)
     MotionPoint
         Point in which all fields have values.
     """
-    return equations_between_ruptures(scene, with_time=False).evaluate_point(
+    return build_equations_between_ruptures(scene, with_time=False).evaluate_motion_point(
         (spring_stress, *states)
     )

@@ -7,14 +7,19 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rsfstudy.slider.friction import build_friction_relation, compute_steady_states
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
 
 #: Largest step size of the finite differences, divided by the scale of the argument. The second
 #: constant contains the coefficients of central differences of order eight.
-_MAX_DIFFERENCE_STEP_OVER_SCALE = 0.05
-_FINITE_DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+_MAX_FINITE_DIFFERENCE_STEP_OVER_SCALE = 0.05
+_CENTRAL_DIFFERENCE_OFFSETS_AND_WEIGHTS = (
+    (1, 4.0 / 5.0),
+    (2, -1.0 / 5.0),
+    (3, 4.0 / 105.0),
+    (4, -1.0 / 280.0),
+)
 #: Default scale of a state, divided by b. If a steady state changes with ln V by more than the
 #: second constant (a fraction of the default scale), this change is the scale of the state.
 _STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
@@ -101,7 +106,7 @@ def compute_state_evolution_derivatives(
     relation = build_friction_relation(scene, steady_state.states)
     shift = relation(steady_state.frictional_stress)[2]
     arguments = [steady_state.log_slip_rate, shift, *steady_state.states]
-    scales, columns, errors = _finite_difference_scales(scene, steady_state, shift), [], []
+    scales, columns, errors = _compute_finite_difference_scales(scene, steady_state, shift), [], []
     # Each unit is the change of an argument that is equivalent to a change in ln V by 1. Rounding
     # errors are proportional to the units.
     units = [scales[0], *(scale / _STATE_SCALE_OVER_B for scale in scales[1:])]
@@ -110,11 +115,11 @@ def compute_state_evolution_derivatives(
     )
     for place, (scale, unit) in enumerate(zip(scales, units, strict=True)):
         # Finite differences with half the step size share half of their arguments.
-        known = dict[float, Numbers]()
+        known = dict[float, FloatTuple]()
 
         def evolve(
-            change: float, place: int = place, known: dict[float, Numbers] = known
-        ) -> Numbers:
+            change: float, place: int = place, known: dict[float, FloatTuple] = known
+        ) -> FloatTuple:
             if change not in known:
                 changed = [*arguments]
                 changed[place] += change
@@ -123,7 +128,7 @@ def compute_state_evolution_derivatives(
             return known[change]
 
         derivatives, error = _differentiate_at_zero(
-            evolve, _MAX_DIFFERENCE_STEP_OVER_SCALE * scale, rounding * unit
+            evolve, _MAX_FINITE_DIFFERENCE_STEP_OVER_SCALE * scale, rounding * unit
         )
         columns.append(derivatives)
         errors.append(error)
@@ -133,7 +138,7 @@ def compute_state_evolution_derivatives(
 
 
 def _differentiate_at_zero(
-    function: Callable[[float], Numbers], initial_step: float, rounding_error: float
+    function: Callable[[float], FloatTuple], initial_step: float, rounding_error: float
 ) -> tuple[list[float], float]:
     """Differentiate a function at zero, and estimate the relative error.
 
@@ -144,13 +149,13 @@ def _differentiate_at_zero(
     the function returns the derivatives for the smaller step size.
     """
     (coarse, _sizes), best, smallest = (
-        _central_differences_at_zero(function, initial_step),
+        _compute_central_differences_at_zero(function, initial_step),
         list[float](),
         math.inf,
     )
     for _ in range(_MAX_HALVINGS):
         initial_step *= 0.5
-        fine, sizes = _central_differences_at_zero(function, initial_step)
+        fine, sizes = _compute_central_differences_at_zero(function, initial_step)
         pairs = zip(fine, coarse, sizes, strict=True)
         error = max(abs(x - y) / size if x != y else 0.0 for x, y, size in pairs)
         noise = _CONVERGENCE_TOLERANCE + rounding_error / initial_step
@@ -162,8 +167,8 @@ def _differentiate_at_zero(
     return best, smallest
 
 
-def _central_differences_at_zero(
-    function: Callable[[float], Numbers], step: float
+def _compute_central_differences_at_zero(
+    function: Callable[[float], FloatTuple], step: float
 ) -> tuple[list[float], list[float]]:
     """Differentiate a function at zero by central differences of order eight.
 
@@ -177,7 +182,7 @@ def _central_differences_at_zero(
     """
     slopes = [0.0] * len(function(step))
     sizes = [*slopes]
-    for number, weight in _FINITE_DIFFERENCE_WEIGHTS:
+    for number, weight in _CENTRAL_DIFFERENCE_OFFSETS_AND_WEIGHTS:
         away = number * step
         for i, (more, less) in enumerate(zip(function(away), function(-away), strict=True)):
             slopes[i] += weight * (more - less) / step
@@ -185,7 +190,7 @@ def _central_differences_at_zero(
     return slopes, sizes
 
 
-def _finite_difference_scales(
+def _compute_finite_difference_scales(
     scene: SceneView, steady_state: SteadySliding, state_shift: float
 ) -> list[float]:
     """Return the finite-difference scales of ln V, the shift and each state."""

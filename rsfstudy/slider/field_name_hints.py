@@ -9,25 +9,25 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-_STIFFNESS_HINT = (
+_STIFFNESS_FIELD_NAME_HINT = (
     "stiffness_ratio (stiffness divided by the critical stiffness) or stiffness (k "
     "D_c/sigma_*, or a value with units if you use a rig, for example '0.05 MPa/um')"
 )
-_INERTIA_HINT = (
+_INERTIA_FIELD_NAME_HINT = (
     "Write inertia=True, and pass the period of free oscillation in s as period. Alternatively, "
     "create the scene from a rig."
 )
-_LOAD_VELOCITY_HINT = (
+_LOAD_VELOCITY_FIELD_NAME_HINT = (
     "Write load_velocity_ratio, which is V_0/V_*. If you use a rig, write load_velocity with units."
 )
-_DURATION_HINT = "Pass the duration to rsfstudy.simulate(scene, duration=...)."
+_SIMULATION_DURATION_HINT = "Pass the duration to rsfstudy.simulate(scene, duration=...)."
 
 
-def _rig_quantity_hint(symbol: str, name: str) -> str:
+def _hint_for_rig_quantity(symbol: str, rig_quantity_name: str) -> str:
     """Return an error hint for a rig quantity that is not a scene field."""
     return (
-        f"The quantity {symbol} belongs to a rig. Pass Rig({name}=...). In a study with a rig, "
-        f"{name} can also be an axis or an override."
+        f"The quantity {symbol} belongs to a rig. Pass Rig({rig_quantity_name}=...). In a study with a rig, "
+        f"{rig_quantity_name} can also be an axis or an override."
     )
 
 
@@ -37,26 +37,27 @@ def _map_names_to_same_value(space_separated_names: str, value: str) -> dict[str
 
 #: Error hints for field names that users may expect but scenes do not have.
 _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
-    **_map_names_to_same_value("k K kappa spring_constant", f"Write {_STIFFNESS_HINT}."),
+    **_map_names_to_same_value("k K kappa spring_constant", f"Write {_STIFFNESS_FIELD_NAME_HINT}."),
     **_map_names_to_same_value("b B", "Write b_over_a, which is b/a."),
     **_map_names_to_same_value("a_minus_b b_minus_a ab", "Write a and b_over_a, which is b/a."),
     **_map_names_to_same_value("A", "Write a."),
     **_map_names_to_same_value(
-        "Dc dc D_c d_c DC L dcrit slip_distance", _rig_quantity_hint("D_c", "slip_distance")
+        "Dc dc D_c d_c DC L dcrit slip_distance", _hint_for_rig_quantity("D_c", "slip_distance")
     ),
     **_map_names_to_same_value("mu mu0 mu_0 mu_ref f0 f_0", "Write mu_star."),
     **_map_names_to_same_value(
-        "sigma sigma_n sigman sigma0 sigma_star sn", _rig_quantity_hint("sigma_*", "normal_stress")
+        "sigma sigma_n sigman sigma0 sigma_star sn",
+        _hint_for_rig_quantity("sigma_*", "normal_stress"),
     ),
     **_map_names_to_same_value(
-        "V0 V_0 v0 v_0 V v Vl vl vlp Vlp velocity load_velocity", _LOAD_VELOCITY_HINT
+        "V0 V_0 v0 v_0 V v Vl vl vlp Vlp velocity load_velocity", _LOAD_VELOCITY_FIELD_NAME_HINT
     ),
     **_map_names_to_same_value(
         "V_star v_star vstar Vref vref V_ref v_ref reference_velocity",
-        _rig_quantity_hint("V_*", "reference_velocity"),
+        _hint_for_rig_quantity("V_*", "reference_velocity"),
     ),
-    **_map_names_to_same_value("G shear_modulus", _rig_quantity_hint("G", "shear_modulus")),
-    **_map_names_to_same_value("rho density", _rig_quantity_hint("rho", "density")),
+    **_map_names_to_same_value("G shear_modulus", _hint_for_rig_quantity("G", "shear_modulus")),
+    **_map_names_to_same_value("rho density", _hint_for_rig_quantity("rho", "density")),
     **_map_names_to_same_value(
         "kc k_c kcr k_cr k_ratio k_over_kc k_kc", "Write stiffness_ratio, which is k/k_cr."
     ),
@@ -67,11 +68,11 @@ _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
     **_map_names_to_same_value(
         "theta theta0 theta_0", "Write initial_state, which is b ln(theta/theta_*)."
     ),
-    **_map_names_to_same_value("m M mass", _INERTIA_HINT),
+    **_map_names_to_same_value("m M mass", _INERTIA_FIELD_NAME_HINT),
     **_map_names_to_same_value("eta damping", "Write radiation_damping, which is eta V_*/sigma_*."),
     **_map_names_to_same_value("T", "Write period, in s."),
     **_map_names_to_same_value("evolution evolution_law state_law friction_law", "Write law."),
-    **_map_names_to_same_value("duration t_end tmax", _DURATION_HINT),
+    **_map_names_to_same_value("duration t_end tmax", _SIMULATION_DURATION_HINT),
 }
 #: Mapping from synonyms of laws to the names that rsfstudy uses.
 _LAW_NAME_BY_ALIAS: Mapping[str, str] = {
@@ -102,7 +103,7 @@ def hint_for_unknown_field(field_name: str) -> str:
     return _HINT_BY_WRONG_FIELD_NAME.get(field_name, "")
 
 
-def canonical_law_name(law_name: str) -> str:
+def replace_law_alias_by_law_name(law_name_or_alias: str) -> str:
     """Return the name of a law for one of its synonyms.
 
     Parameters
@@ -115,14 +116,16 @@ def canonical_law_name(law_name: str) -> str:
     str
         Name of the law. An unknown name is returned unchanged.
     """
-    return _LAW_NAME_BY_ALIAS.get(_normalise_name(law_name), law_name)
+    return _LAW_NAME_BY_ALIAS.get(
+        _normalise_case_and_separators(law_name_or_alias), law_name_or_alias
+    )
 
 
-def _normalise_name(law_name: str) -> str:
-    return law_name.strip().lower().replace("-", "_").replace(" ", "_")
+def _normalise_case_and_separators(part_name: str) -> str:
+    return part_name.strip().lower().replace("-", "_").replace(" ", "_")
 
 
-def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) -> str:
+def hint_for_unknown_part_name(slot_name: str, value: Any, valid_part_names: Iterable[str]) -> str:
     """Return an error hint for an unknown value of a field such as ``law``.
 
     Parameters
@@ -146,14 +149,14 @@ def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) 
         )
     if not isinstance(value, str):
         return ""
-    plain = _normalise_name(value)
+    plain = _normalise_case_and_separators(value)
     if slot_name == "law" and plain == "nagata":
         return "Write stress_dependence=..., which can be combined with any law."
-    return f"Write {slot_name}={plain!r}." if plain in choices else ""
+    return f"Write {slot_name}={plain!r}." if plain in valid_part_names else ""
 
 
 def hint_for_positional_argument(
-    value: Any, choices_by_slot_name: Mapping[str, Iterable[str]]
+    value: Any, part_names_by_slot_name: Mapping[str, Iterable[str]]
 ) -> str:
     """Return an error hint for a positional argument of ``Scene``.
 
@@ -169,8 +172,8 @@ def hint_for_positional_argument(
     str
         Hint for the error message.
     """
-    for slot, choices in choices_by_slot_name.items() if isinstance(value, str) else ():
-        found = hint_for_unknown_choice(slot, value, choices)
+    for slot, choices in part_names_by_slot_name.items() if isinstance(value, str) else ():
+        found = hint_for_unknown_part_name(slot, value, choices)
         if found:
             return found
     if isinstance(value, Mapping):

@@ -35,7 +35,7 @@ from rsfstudy.slider import (
     state_functions,
     temperature_functions,
 )
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -90,22 +90,22 @@ class FrictionFunctions(NamedTuple):
         stress with respect to displacement, including noise.
     """
 
-    strength: Function
-    effective_normal_stress: Function
-    rig_normal_stress: Function
-    boundary_pressure: Function
-    evolutions: Function
-    steady_states: Function
-    state_sum: Function
-    state_variable: Function
-    state_contribution: Function
-    pressure_derivatives: Function
-    states_from_strength: Function
-    load_point_stress: Function
-    load_point_stress_change: Function
+    strength: NumericFunction
+    effective_normal_stress: NumericFunction
+    rig_normal_stress: NumericFunction
+    boundary_pressure: NumericFunction
+    state_evolutions: NumericFunction
+    steady_states: NumericFunction
+    state_sum: NumericFunction
+    state_variable: NumericFunction
+    state_contribution_to_friction: NumericFunction
+    strength_derivatives_by_pressure: NumericFunction
+    states_from_strength: NumericFunction
+    load_point_stress: NumericFunction
+    load_point_stress_change: NumericFunction
     state_count: int
     indices_of_states_in_distance: tuple[int, ...]
-    spring_stress_rate: Function = path_length.spring_stress_rate
+    spring_stress_rate: NumericFunction = path_length.compute_spring_stress_rate
 
 
 def build_friction_functions(scene: SceneView) -> FrictionFunctions:
@@ -125,20 +125,21 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
     law, source, loading = scene.parts.law, scene.pressure_source, scene.stress_loading
     oscillates, law_states = loading.has_load_point_unknown, law.state_count
     boundary = -1 - len(scene.parts.fluid.unknowns) if loading.has_stress_unknowns else 0
-    strength, effective, outer, derivatives = _build_stress_functions(
-        scene.parts.normal_stress.normal_stress or friction_relation.zero_normal_stress_excess,
-        _find_stress_effects_on_state(scene),
+    strength, effective, outer, derivatives = _build_functions_of_frictional_stress(
+        scene.parts.normal_stress.normal_stress
+        or friction_relation.return_zero_normal_stress_excess,
+        _list_stress_effect_functions(scene),
         "load point" if oscillates else "pressure" if source.unknowns else "",
         boundary,
         law.regularised,
     )
-    evolutions, steady_states = state_functions.find_law_functions(law)
+    evolutions, steady_states = state_functions.find_evolutions_and_steady_states_of_law(law)
     if source.unknowns:
         evolutions, steady_states = (
-            state_functions.append_auxiliary_evolutions(
+            state_functions.combine_law_and_auxiliary_rates(
                 evolutions, source.auxiliary_rates, law_states
             ),
-            state_functions.append_auxiliary_steady_states(
+            state_functions.combine_law_and_auxiliary_steady_states(
                 steady_states, source.auxiliary_steady_states
             ),
         )
@@ -148,51 +149,53 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         strength=strength,
         effective_normal_stress=effective,
         rig_normal_stress=outer,
-        boundary_pressure=friction_relation.build_pressure_function(boundary),
-        evolutions=evolutions,
+        boundary_pressure=friction_relation.build_pore_pressure_function(boundary),
+        state_evolutions=evolutions,
         steady_states=steady_states,
-        state_sum=state_functions.build_sum_function(law_states),
-        state_variable=state_functions.isothermal_state_variable,
-        state_contribution=state_functions.build_state_contribution_function(
+        state_sum=state_functions.build_tuple_sum_function(law_states),
+        state_variable=state_functions.return_isothermal_state_variable,
+        state_contribution_to_friction=state_functions.build_state_contribution_function(
             law_states, derivatives if source.unknowns else None
         ),
-        pressure_derivatives=derivatives,
+        strength_derivatives_by_pressure=derivatives,
         states_from_strength=state_functions.build_states_from_strength_function(law_states),
-        load_point_stress=friction_relation.load_point_stress
+        load_point_stress=friction_relation.compute_load_point_stress
         if oscillates
-        else friction_relation.zero_load_point_stress,
-        load_point_stress_change=friction_relation.build_pressure_function(-1 if oscillates else 0),
+        else friction_relation.return_zero_load_point_stress,
+        load_point_stress_change=friction_relation.build_pore_pressure_function(
+            -1 if oscillates else 0
+        ),
         state_count=scene.state_count,
         indices_of_states_in_distance=(*range(law_states), *compared),
-        spring_stress_rate=path_length.spring_stress_rate_with_noise
+        spring_stress_rate=path_length.compute_spring_stress_rate_with_noise
         if scene.parts.loading_noise.is_active
-        else path_length.spring_stress_rate,
+        else path_length.compute_spring_stress_rate,
     )
     if not scene.parts.temperature.unknowns:
         return functions
     return functions._replace(
-        **temperature_functions.build_replacements(scene, functions._asdict())
+        **temperature_functions.build_temperature_dependent_functions(scene, functions._asdict())
     )
 
 
-def _find_stress_effects_on_state(scene: SceneView) -> tuple[Function, ...]:
+def _list_stress_effect_functions(scene: SceneView) -> tuple[NumericFunction, ...]:
     """Return the functions that define how stress changes the state variable."""
     law = scene.parts.law
     of_shear_stress = (
-        friction_relation.shear_stress_effect_on_state if law.stress_dependence else None
+        friction_relation.compute_shear_stress_effect_on_state if law.stress_dependence else None
     )
     effects = scene.parts.normal_stress.state_effect, law.state_effect, of_shear_stress
     return tuple(effect for effect in effects if effect is not None)
 
 
 @cache
-def _build_stress_functions(
-    normal_stress: Function,
-    state_effects: tuple[Function, ...],
-    last_unknown: str,
+def _build_functions_of_frictional_stress(
+    normal_stress_function: NumericFunction,
+    state_effect_functions: tuple[NumericFunction, ...],
+    kind_of_last_unknown: str,
     boundary_pressure_index: int,
     allows_reversed_slip: bool,
-) -> tuple[Function, Function, Function, Function]:
+) -> tuple[NumericFunction, NumericFunction, NumericFunction, NumericFunction]:
     """Build the friction functions whose argument is the frictional stress.
 
     The argument ``last_unknown`` is ``"pressure"``, ``"load point"`` or an empty string. This
@@ -201,34 +204,34 @@ def _build_stress_functions(
     unknown.
     """
     effect = (
-        reduce(friction_relation.sum_state_effects, state_effects)
-        if state_effects
-        else friction_relation.zero_state_effect
+        reduce(friction_relation.build_sum_of_two_state_effects, state_effect_functions)
+        if state_effect_functions
+        else friction_relation.return_zero_stress_effect_on_state
     )
     effective, outer = (
-        friction_relation.build_effective_normal_stress_function(normal_stress, index)
-        for index in (-1 if last_unknown == "pressure" else 0, boundary_pressure_index)
+        friction_relation.build_effective_normal_stress_function(normal_stress_function, index)
+        for index in (-1 if kind_of_last_unknown == "pressure" else 0, boundary_pressure_index)
     )
-    is_variable = normal_stress is not friction_relation.zero_normal_stress_excess
+    is_variable = normal_stress_function is not friction_relation.return_zero_normal_stress_excess
     strength = (
         friction_relation.build_strength_function(effective, effect)
-        if is_variable or state_effects or last_unknown == "pressure"
+        if is_variable or state_effect_functions or kind_of_last_unknown == "pressure"
         else friction_relation.friction_relation_at_constant_normal_stress
     )
     if allows_reversed_slip:
         strength = friction_relation.extend_relation_to_reversed_slip(strength)
-    if last_unknown == "load point":
+    if kind_of_last_unknown == "load point":
         strength, effective, outer = map(
             friction_relation.wrap_with_load_point_stress, (strength, effective, outer)
         )
-        derivatives = friction_relation.build_load_point_derivatives_function(strength)
+        derivatives = friction_relation.build_strength_derivatives_by_load_point(strength)
     else:
-        derivatives = friction_relation.build_pressure_derivatives_function(effective, effect)
+        derivatives = friction_relation.build_strength_derivatives_by_pressure(effective, effect)
     return strength, effective, outer, derivatives
 
 
 def build_friction_relation(
-    scene: SceneView, states: Numbers = ()
+    scene: SceneView, states: FloatTuple = ()
 ) -> Callable[[float], tuple[float, float, float, float]]:
     r"""Return the friction relation of a scene as a function of stress.
 
@@ -250,8 +253,8 @@ def build_friction_relation(
     return lambda friction: strength(friction, known, p)
 
 
-def effective_normal_stress_at(
-    scene: SceneView, frictional_stress: float, states: Numbers = ()
+def compute_effective_normal_stress(
+    scene: SceneView, frictional_stress: float, states: FloatTuple = ()
 ) -> float:
     r"""Compute the effective normal stress from the frictional stress.
 
@@ -277,7 +280,9 @@ def effective_normal_stress_at(
     return 1.0 + float(stress[0])
 
 
-def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers, float], Numbers]:
+def build_state_evolution_function(
+    scene: SceneView,
+) -> Callable[[float, FloatTuple, float], FloatTuple]:
     """Return the state evolution of a scene as a function.
 
     Parameters
@@ -295,7 +300,7 @@ def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers
     return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
 
 
-def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: float) -> Numbers:
+def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: float) -> FloatTuple:
     r"""Compute the states of steady sliding at a slip rate.
 
     Parameters
@@ -313,9 +318,9 @@ def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: f
         States :math:`\Psi_i` of steady sliding.
     """
     p = scene.friction_parameter_values
-    states: Numbers = scene.friction_functions.steady_states(log_slip_rate, state_shift, p)
+    states: FloatTuple = scene.friction_functions.steady_states(log_slip_rate, state_shift, p)
     if not scene.parts.temperature.unknowns:
         return states
     place = scene.parts.law.state_count
-    rise = temperature_functions.steady_temperature_rise(scene, log_slip_rate)
+    rise = temperature_functions.compute_steady_temperature_rise(scene, log_slip_rate)
     return (*states[:place], rise, *states[place + 1 :])

@@ -43,22 +43,24 @@ from rsfstudy.slider.parameter_layout import (
     STRESS_DEPENDENCE,
     A,
 )
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 
 #: Lower limit of the magnitude of the friction coefficient in scenes in which the slip direction
 #: may reverse. At zero stress, the limit keeps the logarithm of the slip rate finite.
 _MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 
-def zero_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
+def return_zero_normal_stress_excess(
+    frictional_stress: float, p: FloatTuple
+) -> tuple[float, float]:
     """Return a zero change in normal stress and a zero derivative."""
     return 0.0, 0.0
 
 
 @cache
 def build_effective_normal_stress_function(
-    total_normal_stress_function: Function, pressure_index: int
-) -> Function:
+    total_normal_stress_function: NumericFunction, pressure_index: int
+) -> NumericFunction:
     """Return a function that computes the effective normal stress.
 
     Parameters
@@ -75,10 +77,10 @@ def build_effective_normal_stress_function(
         Function ``(g, psis, p) -> (s - 1, slope)``.
     """
 
-    def total_normal_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def total_normal_stress(g: float, psis: FloatTuple, p: FloatTuple) -> tuple[float, float]:
         return total_normal_stress_function(g, p)
 
-    def effective_normal_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def effective_normal_stress(g: float, psis: FloatTuple, p: FloatTuple) -> tuple[float, float]:
         excess, change = total_normal_stress_function(g, p)
         return min(
             max(excess - psis[pressure_index], SMALLEST_NORMAL_STRESS_EXCESS),
@@ -89,7 +91,7 @@ def build_effective_normal_stress_function(
 
 
 @cache
-def build_pressure_function(pressure_index: int) -> Function:
+def build_pore_pressure_function(pressure_index: int) -> NumericFunction:
     """Return a function that reads the pore pressure from the states.
 
     Parameters
@@ -103,13 +105,13 @@ def build_pressure_function(pressure_index: int) -> Function:
         Function ``(psis) -> P``.
     """
 
-    def pressure(psis: Numbers) -> float:
+    def pressure(psis: FloatTuple) -> float:
         return psis[pressure_index]
 
-    return pressure if pressure_index else zero_pressure
+    return pressure if pressure_index else return_zero_pore_pressure
 
 
-def zero_pressure(states: Numbers) -> float:
+def return_zero_pore_pressure(states: FloatTuple) -> float:
     """Return zero pore pressure."""
     return 0.0
 
@@ -118,7 +120,7 @@ FrictionRelationValues = tuple[float, float, float, float]
 
 
 def friction_relation_at_constant_normal_stress(
-    frictional_stress: float, states: Numbers, p: Numbers
+    frictional_stress: float, states: FloatTuple, p: FloatTuple
 ) -> FrictionRelationValues:
     """Evaluate the friction relation at constant normal stress.
 
@@ -127,19 +129,19 @@ def friction_relation_at_constant_normal_stress(
     return frictional_stress, 1.0, 0.0, 0.0
 
 
-def zero_state_effect(
+def return_zero_stress_effect_on_state(
     frictional_stress: float,
     normal_stress_ratio: float,
     normal_stress_derivative: float,
-    p: Numbers,
+    p: FloatTuple,
 ) -> tuple[float, float]:
     """Return a shift and slope of zero, because stress does not change the state."""
     return 0.0, 0.0
 
 
 def build_strength_function(
-    normal_stress_function: Function, state_effect_function: Function
-) -> Function:
+    normal_stress_function: NumericFunction, state_effect_function: NumericFunction
+) -> NumericFunction:
     r"""Return the friction relation for variable normal stress.
 
     The first argument is the function that computes the effective normal stress. The second
@@ -158,7 +160,7 @@ def build_strength_function(
     relative accuracy for arbitrarily large :math:`g`.
     """
 
-    def strength(g: float, psis: Numbers, p: Numbers) -> FrictionRelationValues:
+    def strength(g: float, psis: FloatTuple, p: FloatTuple) -> FrictionRelationValues:
         excess, change = normal_stress_function(g, psis, p)
         ratio, mu_star = 1.0 + excess, p[MU_STAR]
         bend, support = excess - change * g, 1.0 - mu_star * change
@@ -169,11 +171,11 @@ def build_strength_function(
     return strength
 
 
-def shear_stress_effect_on_state(
+def compute_shear_stress_effect_on_state(
     frictional_stress: float,
     normal_stress_ratio: float,
     normal_stress_derivative: float,
-    p: Numbers,
+    p: FloatTuple,
 ) -> tuple[float, float]:
     r"""Compute the effect of shear stress on the state variable.
 
@@ -192,10 +194,14 @@ def shear_stress_effect_on_state(
     return c * frictional_stress * mean, c / normal_stress_ratio
 
 
-def sum_state_effects(first_effect: Function, second_effect: Function) -> Function:
+def build_sum_of_two_state_effects(
+    first_effect: NumericFunction, second_effect: NumericFunction
+) -> NumericFunction:
     """Return a function that adds two effects of stress on the state."""
 
-    def combined_effect(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
+    def combined_effect(
+        g: float, ratio: float, change: float, p: FloatTuple
+    ) -> tuple[float, float]:
         shift, slope = first_effect(g, ratio, change, p)
         other_shift, other_slope = second_effect(g, ratio, change, p)
         return shift + other_shift, slope + other_slope
@@ -203,7 +209,7 @@ def sum_state_effects(first_effect: Function, second_effect: Function) -> Functi
     return combined_effect
 
 
-def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
+def extend_relation_to_reversed_slip(forward_relation: NumericFunction) -> NumericFunction:
     r"""Return the friction relation of a fault that may slip backwards.
 
     The argument is the function that computes the friction relation for forward slip. In the
@@ -227,7 +233,7 @@ def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
     Rice and Ben-Zion (1996), Proc. Natl. Acad. Sci. 93, 3811-3818.
     """
 
-    def reversible_relation(g: float, psis: Numbers, p: Numbers) -> FrictionRelationValues:
+    def reversible_relation(g: float, psis: FloatTuple, p: FloatTuple) -> FrictionRelationValues:
         forward, slope, shift, shift_slope = forward_relation(g, psis, p)
         a, mu_star = p[A], p[MU_STAR]
         coefficient_now = mu_star + forward - shift
@@ -239,9 +245,9 @@ def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
     return reversible_relation
 
 
-def build_pressure_derivatives_function(
-    normal_stress_function: Function, state_effect_function: Function
-) -> Function:
+def build_strength_derivatives_by_pressure(
+    normal_stress_function: NumericFunction, state_effect_function: NumericFunction
+) -> NumericFunction:
     r"""Return a function for the derivatives of strength with respect to pressure.
 
     The first argument is the function that computes the effective normal stress. The second
@@ -257,7 +263,7 @@ def build_pressure_derivatives_function(
     derivative of -1, and the second slope with a normal stress derivative of 0.
     """
 
-    def pressure_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def pressure_derivatives(g: float, psis: FloatTuple, p: FloatTuple) -> tuple[float, float]:
         ratio = 1.0 + normal_stress_function(g, psis, p)[0]
         along = state_effect_function(g, ratio, -1.0, p)[1]
         shift = along - state_effect_function(g, ratio, 0.0, p)[1]
@@ -266,12 +272,12 @@ def build_pressure_derivatives_function(
     return pressure_derivatives
 
 
-def zero_load_point_stress(states: Numbers, p: Numbers) -> float:
+def return_zero_load_point_stress(states: FloatTuple, p: FloatTuple) -> float:
     """Return zero, because a load point that moves steadily adds no stress."""
     return 0.0
 
 
-def load_point_stress(states: Numbers, p: Numbers) -> float:
+def compute_load_point_stress(states: FloatTuple, p: FloatTuple) -> float:
     r"""Compute the shear stress :math:`K D` due to an oscillation of the load point.
 
     The unknown of the loading is the last element of the tuple of states. The stress is zero at the
@@ -280,20 +286,20 @@ def load_point_stress(states: Numbers, p: Numbers) -> float:
     return states[-1] - p[LOADING + 2]
 
 
-def wrap_with_load_point_stress(friction_function: Function) -> Function:
+def wrap_with_load_point_stress(friction_function: NumericFunction) -> NumericFunction:
     """Return a friction function that includes the load point stress.
 
     The argument g of ``friction_function`` is the total frictional stress. The argument g of the
     returned function does not include the load point stress :math:`K D`.
     """
 
-    def function_with_load_point_stress(g: float, psis: Numbers, p: Numbers) -> Numbers:
-        return friction_function(g + load_point_stress(psis, p), psis, p)
+    def function_with_load_point_stress(g: float, psis: FloatTuple, p: FloatTuple) -> FloatTuple:
+        return friction_function(g + compute_load_point_stress(psis, p), psis, p)
 
     return function_with_load_point_stress
 
 
-def build_load_point_derivatives_function(strength_function: Function) -> Function:
+def build_strength_derivatives_by_load_point(strength_function: NumericFunction) -> NumericFunction:
     """Return a function for derivatives with respect to the load point stress.
 
     The argument is the function that computes the friction relation of the scene. The returned
@@ -301,7 +307,7 @@ def build_load_point_derivatives_function(strength_function: Function) -> Functi
     :math:`K D`. The derivatives are equal to the derivatives with respect to g.
     """
 
-    def load_point_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def load_point_derivatives(g: float, psis: FloatTuple, p: FloatTuple) -> tuple[float, float]:
         _value, slope, _shift, shift_slope = strength_function(g, psis, p)
         return slope, shift_slope
 

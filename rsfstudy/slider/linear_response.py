@@ -38,15 +38,15 @@ from rsfstudy.slider.evolution_derivatives import (
     compute_state_evolution_derivatives,
 )
 from rsfstudy.slider.friction import build_friction_relation
-from rsfstudy.slider.parameter_layout import temperature_parameter_values
+from rsfstudy.slider.parameter_layout import pack_temperature_parameter_values
 from rsfstudy.slider.polynomials import (
     PolynomialCoefficients,
+    compute_dot_product,
     compute_resolvent_polynomials,
-    dot_product,
 )
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
-from rsfstudy.slider.temperature_functions import temperature_derivatives
+from rsfstudy.slider.temperature_functions import compute_derivatives_by_temperature
 
 
 class LinearisedForceBalance(NamedTuple):
@@ -71,11 +71,11 @@ def linearise_force_balance(
     )
     norm = 0.0 if quasi_static else scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
     return LinearisedForceBalance(
-        *linear_friction_response(scene, steady_state, evolution_derivatives), damping, norm
+        *compute_linear_friction_response(scene, steady_state, evolution_derivatives), damping, norm
     )
 
 
-def linear_friction_response(
+def compute_linear_friction_response(
     scene: SceneView,
     steady_state: SteadySliding,
     evolution_derivatives: StateEvolutionDerivatives | None = None,
@@ -114,7 +114,7 @@ def linear_friction_response(
         evolution_derivatives or compute_state_evolution_derivatives(scene, steady_state)
     )
     by_state = [list(row) for row in by_state]
-    weights, shifting = _log_slip_rate_change_by_each_state(scene, steady_state)
+    weights, shifting = _compute_state_weights_in_friction(scene, steady_state)
     for row, of_shift in zip(by_state, by_shift, strict=True):
         for place, shift in shifting.items():
             row[place] += of_shift * shift
@@ -123,12 +123,12 @@ def linear_friction_response(
     below = [slope * x for x in denominator]
     for power, matrix in enumerate(adjugate):
         for weight, row in zip(weights, matrix, strict=True):
-            above[power] += weight * dot_product(row, by_rate)
-            below[power] -= shift_slope * (weight * dot_product(row, by_shift))
+            above[power] += weight * compute_dot_product(row, by_rate)
+            below[power] -= shift_slope * (weight * compute_dot_product(row, by_shift))
     return above, below
 
 
-def _log_slip_rate_change_by_each_state(
+def _compute_state_weights_in_friction(
     scene: SceneView, steady_state: SteadySliding
 ) -> tuple[list[float], dict[int, float]]:
     """Return the weight of each state in the friction relation.
@@ -139,8 +139,8 @@ def _log_slip_rate_change_by_each_state(
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     weights, shifts = [1.0] * law, dict[int, float]()
     if scene.parts.temperature.unknowns:
-        gained, shifts[law] = temperature_derivatives(
-            steady_state.states[law], temperature_parameter_values(scene)
+        gained, shifts[law] = compute_derivatives_by_temperature(
+            steady_state.states[law], pack_temperature_parameter_values(scene)
         )
         weights.append(-gained)
     if fluid:

@@ -84,13 +84,15 @@ def check_needed_quantities(scene: SceneView) -> None:
     """
     for slot, part in zip(scene.parts._fields, scene.parts, strict=True):
         missing = (
-            sorted(set(part.needs) - quantities_known_to_part(scene, part)) if part.needs else []
+            sorted(set(part.needs) - find_quantities_known_to_part(scene, part))
+            if part.needs
+            else []
         )
         if missing:
-            raise _missing_quantities_error(scene, slot, part, missing)
+            raise _build_missing_quantities_error(scene, slot, part, missing)
 
 
-def quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
+def find_quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
     """Return the quantities that are available to the functions of a part.
 
     The result contains the quantities passed to the functions, the quantities that are constant in
@@ -109,10 +111,10 @@ def quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
         Names of quantities in ``QUANTITIES_A_PART_MAY_NEED``.
     """
     constant = {NORMAL_STRESS, PORE_PRESSURE} - {
-        change.unknown_quantity_name for change in _causes_of_unknown_quantities(scene)
+        change.unknown_quantity_name for change in _find_causes_of_unknown_quantities(scene)
     }
     found = constant | part.received_quantities
-    if part is scene.parts.law and _causes_of_unknown_friction(scene):
+    if part is scene.parts.law and _find_causes_of_unknown_friction(scene):
         found -= {FRICTION_COEFFICIENT}
     return frozenset(
         found | {name for name, terms in _QUANTITIES_COMPUTED_FROM_OTHERS.items() if found >= terms}
@@ -127,7 +129,7 @@ class _CauseOfUnknownQuantity(NamedTuple):
     remedy: str
 
 
-def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
+def _find_causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
     """Return the reasons why quantities are unavailable in a scene."""
     parts, found = scene.parts, []
     if parts.normal_stress.normal_stress is not None:
@@ -142,10 +144,10 @@ def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuant
     if parts.fluid.unknowns:
         cause = f"fluid={parts.fluid.name!r}"
         found.append(_CauseOfUnknownQuantity(PORE_PRESSURE, cause, "set fluid='drained'"))
-    return found + _causes_of_unknown_friction(scene)
+    return found + _find_causes_of_unknown_friction(scene)
 
 
-def _causes_of_unknown_friction(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
+def _find_causes_of_unknown_friction(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
     """Return the reasons why a law cannot compute the friction coefficient.
 
     The friction coefficient of forward slip is not valid if slip reverses. If friction depends on
@@ -160,11 +162,11 @@ def _causes_of_unknown_friction(scene: SceneView) -> list[_CauseOfUnknownQuantit
     return [_CauseOfUnknownQuantity(FRICTION_COEFFICIENT, *texts) for texts in causes]
 
 
-def _missing_quantities_error(
+def _build_missing_quantities_error(
     scene: SceneView, slot_name: str, part: Part, missing_quantity_names: list[str]
 ) -> InvalidValue:
     """Return the error for a part that needs an unavailable quantity."""
-    known = quantities_known_to_part(scene, part)
+    known = find_quantities_known_to_part(scene, part)
     # Determine the missing quantities, and the fields of the scene that make them unavailable.
     wanted = (
         set[str]().union(
@@ -174,7 +176,7 @@ def _missing_quantities_error(
     )
     changes = [
         change
-        for change in _causes_of_unknown_quantities(scene)
+        for change in _find_causes_of_unknown_quantities(scene)
         if change.unknown_quantity_name in wanted
     ]
     causes = "with " + " and ".join(dict.fromkeys(change.cause_text for change in changes))

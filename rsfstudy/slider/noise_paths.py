@@ -22,17 +22,17 @@ import numpy as np
 from scipy.special import ndtri
 
 #: Binary exponent of the base interval: it is at least 2**31 and less than 2**32.
-_BASE_EXPONENT = 32
+_BASE_INTERVAL_BINARY_EXPONENT = 32
 #: Number of samples that are computed at once.
 _SAMPLES_PER_BLOCK = 4096
 #: Smallest distance between the start or end of a loading segment and a sample, relative to the
 #: sampling interval. Closer samples are left out, because rounding errors dominate the distance.
-_MIN_DISTANCE_OVER_INTERVAL = 1e-9
+_MIN_TIME_TO_SAMPLE_OVER_INTERVAL = 1e-9
 #: Number of words that the generator returns for each value of its counter.
-_WORDS_PER_COUNT = 4
+_RANDOM_WORDS_PER_COUNTER_VALUE = 4
 
 
-class Path(NamedTuple):
+class UnitNoisePath(NamedTuple):
     r"""Path of unit noise, as a function of time in :math:`D_c/V_*`.
 
     Without a correlation time, the path is a Wiener process with the variance :math:`t`. With the
@@ -51,10 +51,12 @@ class Path(NamedTuple):
     """
 
     seed: int
-    stream: int
+    stream_number: int
     correlation_time: float | None = None
 
-    def sample(self, interval: float, first: int, count: int) -> np.ndarray:
+    def compute_samples(
+        self, sampling_interval: float, first_sample_index: int, sample_count: int
+    ) -> np.ndarray:
         """Return the path at multiples of the sampling interval.
 
         Parameters
@@ -71,42 +73,55 @@ class Path(NamedTuple):
         ndarray of shape (count,)
             Values of the path.
         """
-        mantissa, exponent = math.frexp(interval)
-        level = _BASE_EXPONENT - exponent
-        base = math.ldexp(mantissa, _BASE_EXPONENT)
-        return self._sample_level(base, level, first, first + count)
+        mantissa, exponent = math.frexp(sampling_interval)
+        level = _BASE_INTERVAL_BINARY_EXPONENT - exponent
+        base = math.ldexp(mantissa, _BASE_INTERVAL_BINARY_EXPONENT)
+        return self._compute_samples_at_bisection_level(
+            base, level, first_sample_index, first_sample_index + sample_count
+        )
 
-    def _sample_level(self, base: float, level: int, first: int, stop: int) -> np.ndarray:
+    def _compute_samples_at_bisection_level(
+        self, base_interval: float, level: int, first_sample_index: int, stop_sample_index: int
+    ) -> np.ndarray:
         """Return the path at the times ``i * base/2**level`` for first <= i < stop."""
         if level == 0:
-            return self._sample_base(base, stop)[first:]
-        spacing = math.ldexp(base, 1 - level)
-        left, right = first // 2, stop // 2
-        parents = self._sample_level(base, level - 1, left, right + 1)
-        weight, deviation = self._bridge(spacing)
+            return self._compute_samples_at_base_interval(base_interval, stop_sample_index)[
+                first_sample_index:
+            ]
+        spacing = math.ldexp(base_interval, 1 - level)
+        left, right = first_sample_index // 2, stop_sample_index // 2
+        parents = self._compute_samples_at_bisection_level(
+            base_interval, level - 1, left, right + 1
+        )
+        weight, deviation = self._compute_bridge_weight_and_deviation(spacing)
         values = np.empty(2 * len(parents) - 1)
         values[::2] = parents
-        values[1::2] = weight * (parents[:-1] + parents[1:]) + deviation * self._normals(
-            level, left, right - left
-        )
-        return values[first - 2 * left : stop - 2 * left]
+        values[1::2] = weight * (
+            parents[:-1] + parents[1:]
+        ) + deviation * self._draw_normal_random_numbers(level, left, right - left)
+        return values[first_sample_index - 2 * left : stop_sample_index - 2 * left]
 
-    def _sample_base(self, base: float, stop: int) -> np.ndarray:
+    def _compute_samples_at_base_interval(
+        self, base_interval: float, stop_sample_index: int
+    ) -> np.ndarray:
         """Return the first values of the path at multiples of the base interval."""
-        values, normals = [0.0], self._normals(0, 0, max(stop - 1, 0))
-        kept, deviation = self._transition(base)
+        values, normals = (
+            [0.0],
+            self._draw_normal_random_numbers(0, 0, max(stop_sample_index - 1, 0)),
+        )
+        kept, deviation = self._compute_decay_and_innovation_deviation(base_interval)
         for normal in normals.tolist():
             values.append(kept * values[-1] + deviation * normal)
-        return np.array(values[:stop])
+        return np.array(values[:stop_sample_index])
 
-    def _transition(self, spacing: float) -> tuple[float, float]:
+    def _compute_decay_and_innovation_deviation(self, time_step: float) -> tuple[float, float]:
         """Return the decay factor of a step, and the standard deviation of its noise."""
         if self.correlation_time is None:
-            return 1.0, math.sqrt(spacing)
-        decay = 2.0 * spacing / self.correlation_time
+            return 1.0, math.sqrt(time_step)
+        decay = 2.0 * time_step / self.correlation_time
         return math.exp(-0.5 * decay), math.sqrt(-0.5 * self.correlation_time * math.expm1(-decay))
 
-    def _bridge(self, spacing: float) -> tuple[float, float]:
+    def _compute_bridge_weight_and_deviation(self, neighbour_spacing: float) -> tuple[float, float]:
         r"""Return the weight of both neighbours, and the midpoint standard deviation.
 
         With the correlation :math:`\rho` over half the spacing, the weight is
@@ -114,31 +129,36 @@ class Path(NamedTuple):
         the factor :math:`(1 - \rho^2)/(1 + \rho^2)`.
         """
         if self.correlation_time is None:
-            return 0.5, 0.5 * math.sqrt(spacing)
-        ratio = 0.5 * spacing / self.correlation_time
+            return 0.5, 0.5 * math.sqrt(neighbour_spacing)
+        ratio = 0.5 * neighbour_spacing / self.correlation_time
         correlation = math.exp(-ratio)
         variance = 0.5 * self.correlation_time * math.tanh(ratio)
         return correlation / (1.0 + correlation * correlation), math.sqrt(variance)
 
-    def _normals(self, level: int, first: int, count: int) -> np.ndarray:
+    def _draw_normal_random_numbers(
+        self, bisection_level: int, first_index: int, count: int
+    ) -> np.ndarray:
         """Return the normally distributed random numbers of a level."""
-        skipped = first % _WORDS_PER_COUNT
+        skipped = first_index % _RANDOM_WORDS_PER_COUNTER_VALUE
         generator = np.random.Philox(
-            key=np.array([self.seed, self.stream], dtype=np.uint64),
-            counter=np.array([first // _WORDS_PER_COUNT, level, 0, 0], dtype=np.uint64),
+            key=np.array([self.seed, self.stream_number], dtype=np.uint64),
+            counter=np.array(
+                [first_index // _RANDOM_WORDS_PER_COUNTER_VALUE, bisection_level, 0, 0],
+                dtype=np.uint64,
+            ),
         )
         words = np.atleast_1d(generator.random_raw(skipped + count))[skipped:]
         uniform = ((words >> np.uint64(11)).astype(float) + 0.5) * 2.0**-53
         return np.asarray(ndtri(uniform))
 
 
-def iterate_segments(
-    start: float,
-    end: float,
-    velocity: float,
-    interval: float,
-    shear: tuple[Path, float],
-    normal: tuple[Path, float] | None,
+def iterate_segment_table_blocks(
+    start_time: float,
+    end_time: float,
+    load_velocity: float,
+    sampling_interval: float,
+    shear_stress_path_and_amplitude: tuple[UnitNoisePath, float],
+    normal_stress_path_and_amplitude: tuple[UnitNoisePath, float] | None,
 ) -> Iterator[np.ndarray]:
     r"""Yield the segment table of noise in blocks.
 
@@ -160,31 +180,44 @@ def iterate_segments(
     ndarray of shape (rows, 7)
         Successive rows of the segment table. The columns are defined in ``parameter_layout``.
     """
-    first = math.floor(start / interval + _MIN_DISTANCE_OVER_INTERVAL)
-    stop, late = end / interval - _MIN_DISTANCE_OVER_INTERVAL, start - first * interval
-    log_velocity = math.log(abs(velocity)) if velocity else -math.inf
+    first = math.floor(start_time / sampling_interval + _MIN_TIME_TO_SAMPLE_OVER_INTERVAL)
+    stop, late = (
+        end_time / sampling_interval - _MIN_TIME_TO_SAMPLE_OVER_INTERVAL,
+        start_time - first * sampling_interval,
+    )
+    log_velocity = math.log(abs(load_velocity)) if load_velocity else -math.inf
     while first < stop:
         count = math.ceil(min(stop - first, _SAMPLES_PER_BLOCK))
-        times = interval * np.arange(first, first + count + 1)
+        times = sampling_interval * np.arange(first, first + count + 1)
         times[0] += late
         if first + count >= stop:
-            times[-1] = end
+            times[-1] = end_time
         fall = rate = np.full(count, math.nan)
-        if normal is not None:
-            values, rate = _values_and_rates(*normal, interval, first, count)
+        if normal_stress_path_and_amplitude is not None:
+            values, rate = _compute_noise_values_and_rates(
+                *normal_stress_path_and_amplitude, sampling_interval, first, count
+            )
             fall = -values
             fall[0] -= late * rate[0]
-        noise_rate = _values_and_rates(*shear, interval, first, count)[1]
-        steady = np.full(count, velocity), np.full(count, log_velocity)
+        noise_rate = _compute_noise_values_and_rates(
+            *shear_stress_path_and_amplitude, sampling_interval, first, count
+        )[1]
+        steady = np.full(count, load_velocity), np.full(count, log_velocity)
         yield np.column_stack((times[:-1], times[1:], *steady, rate, fall, noise_rate))
         first, late = first + count, 0.0
 
 
-def _values_and_rates(
-    path: Path, amplitude: float, interval: float, first: int, count: int
+def _compute_noise_values_and_rates(
+    unit_noise_path: UnitNoisePath,
+    amplitude: float,
+    sampling_interval: float,
+    first_sample_index: int,
+    sample_count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the noise at each sample, and its rate of change after each sample."""
     if not amplitude:
-        return np.zeros(count), np.zeros(count)
-    values = amplitude * path.sample(interval, first, count + 1)
-    return values[:-1], np.diff(values) / interval
+        return np.zeros(sample_count), np.zeros(sample_count)
+    values = amplitude * unit_noise_path.compute_samples(
+        sampling_interval, first_sample_index, sample_count + 1
+    )
+    return values[:-1], np.diff(values) / sampling_interval

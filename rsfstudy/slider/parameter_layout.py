@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from rsfstudy._deprecation import build_getattr_for_former_names
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Numbers, Part, collect_parameter_values
+from rsfstudy.slider.parts import FloatTuple, Part, collect_parameter_values
 from rsfstudy.slider.scene_view import SceneView
 
 #: Indices of the parameters that every scene has: the direct effect parameter a, the change in the
@@ -58,25 +58,25 @@ BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
 
 #: Upper limit of ln(V/V_*). Larger slip rates occur only in trial steps that the integrator
 #: rejects, because a motion ends at ln(V/V_*) = 276 with the status ``slip_rate_unbounded``.
-LARGEST_LOG_SLIP_RATE = 300.0
+LOG_SLIP_RATE_UPPER_LIMIT = 300.0
 #: Upper limit of ln(V_*/V). Without loading, slip is treated as stopped at a slip rate of 10^-290
 #: V_*.
-LARGEST_LOG_SLOWNESS = 680.0
+LOG_SLOWNESS_UPPER_LIMIT = 680.0
 #: Limits of the normal stress ratio minus one. Normal stress ratios outside these limits occur only
 #: in trial steps of the integrator.
 SMALLEST_NORMAL_STRESS_EXCESS, LARGEST_NORMAL_STRESS_EXCESS = 1e-12 - 1.0, 1e12
 
 
-class _ParameterValueSource(Protocol):
+class _HasParameterValues(Protocol):
     """Protocol for parts, or combinations of parts, that provide parameters."""
 
     @property
     def name(self) -> str: ...
 
-    def parameter_values(self, scene: SceneView) -> Numbers: ...
+    def parameter_values(self, scene: SceneView) -> FloatTuple: ...
 
 
-def pack_parameter_values(scene: SceneView) -> Numbers:
+def pack_parameter_values(scene: SceneView) -> FloatTuple:
     """Collect all parameters of a scene in a tuple.
 
     Parameters
@@ -94,7 +94,7 @@ def pack_parameter_values(scene: SceneView) -> Numbers:
     return (*p[:STIFFNESS], *of_load, *p[STRESS_DEPENDENCE:])
 
 
-def pack_friction_parameter_values(scene: SceneView) -> Numbers:
+def pack_friction_parameter_values(scene: SceneView) -> FloatTuple:
     """Collect the parameters that affect friction in a tuple.
 
     Parameters
@@ -115,17 +115,17 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
     of_stress = law.stress_dependence, scene.imposed_normal_stress
     common = slider.a, size, slider.mu_star, *of_load, *of_stress
     own = (
-        *_part_parameters_padded_with_nan(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
-        *_part_parameters_padded_with_nan(scene.pressure_source, scene, DYNAMICS - FLUID),
-        *_part_parameters_padded_with_nan(parts.dynamics, scene, LAW - DYNAMICS),
+        *_pad_part_parameters_with_nan(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
+        *_pad_part_parameters_with_nan(scene.pressure_source, scene, DYNAMICS - FLUID),
+        *_pad_part_parameters_with_nan(parts.dynamics, scene, LAW - DYNAMICS),
     )
-    last = collect_parameter_values(law, scene), temperature_parameter_values(scene)
+    last = collect_parameter_values(law, scene), pack_temperature_parameter_values(scene)
     # The last parameter of a scene with noise is the rate at which noise changes the spring stress.
     noise = (scene.inertial_time, 0.0) if parts.loading_noise.is_active else ()
     return (*common, *own, *last[0], *last[1], *noise)
 
 
-def temperature_parameter_values(scene: SceneView) -> Numbers:
+def pack_temperature_parameter_values(scene: SceneView) -> FloatTuple:
     """Return the parameters of the temperature of the fault.
 
     Parameters
@@ -147,9 +147,9 @@ def temperature_parameter_values(scene: SceneView) -> Numbers:
     return (*common, *collect_parameter_values(temperature, scene))
 
 
-def _part_parameters_padded_with_nan(
-    part: _ParameterValueSource, scene: SceneView, length: int
-) -> Numbers:
+def _pad_part_parameters_with_nan(
+    part: _HasParameterValues, scene: SceneView, padded_length: int
+) -> FloatTuple:
     """Return the parameters of a part, padded with NaN.
 
     Because of the padding, a function that reads an unused element returns NaN instead of a wrong
@@ -160,15 +160,15 @@ def _part_parameters_padded_with_nan(
         if isinstance(part, Part)
         else part.parameter_values(scene)
     )
-    if len(own) > length:
-        rule = f"has {len(own)} parameters, but at most {length} are allowed"
+    if len(own) > padded_length:
+        rule = f"has {len(own)} parameters, but at most {padded_length} are allowed"
         raise InvalidValue(
             "parameter_values",
             part.name,
             rule,
             remedy="Combine parameters, for example as quotients.",
         )
-    return (*own, *(math.nan,) * (length - len(own)))
+    return (*own, *(math.nan,) * (padded_length - len(own)))
 
 
 if not TYPE_CHECKING:

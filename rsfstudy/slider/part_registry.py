@@ -17,11 +17,16 @@ from types import FunctionType
 from typing import Any, TypeVar
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantities import Quantity, is_variable_name
+from rsfstudy.quantities import Quantity, is_valid_variable_name
 from rsfstudy.slider import dynamics, fluid, laws, loading, noise, normal_stress, temperature
-from rsfstudy.slider.field_name_hints import canonical_law_name
+from rsfstudy.slider.field_name_hints import replace_law_alias_by_law_name
 from rsfstudy.slider.needed_quantities import check_names_of_needed_quantities
-from rsfstudy.slider.parts import Part, field_names, is_boolean_field, part_field_quantities
+from rsfstudy.slider.parts import (
+    Part,
+    is_boolean_field,
+    list_part_field_names,
+    list_part_field_quantities,
+)
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.user_loadings import UserLoading
 
@@ -31,7 +36,7 @@ UserPart = type[Part] | UserLoading
 
 
 @dataclass(frozen=True)
-class Slot:
+class PartSlot:
     """Slot of a scene. Each slot of a scene contains one part.
 
     Parameters
@@ -63,7 +68,7 @@ class Slot:
     omit_if_default: bool = False
 
     @property
-    def field_quantity(self) -> Quantity:
+    def part_name_field_quantity(self) -> Quantity:
         """``Quantity`` that describes the field whose value selects the part."""
         return Quantity(self.name, "", "", self.long_name)
 
@@ -73,36 +78,48 @@ class Slot:
         return {part.selected_by: part for part in self.built_in_parts.values() if part.selected_by}
 
 
-SLOTS: tuple[Slot, ...] = (
-    Slot("law", laws.LawBase, laws.BUILT_IN_PARTS, "slip", "state evolution law"),
-    Slot(
+PART_SLOTS: tuple[PartSlot, ...] = (
+    PartSlot("law", laws.LawBase, laws.BUILT_IN_LAW_CLASS_BY_NAME, "slip", "state evolution law"),
+    PartSlot(
         "normal_stress",
         normal_stress.NormalStress,
-        normal_stress.BUILT_IN_PARTS,
+        normal_stress.BUILT_IN_NORMAL_STRESS_CLASS_BY_NAME,
         "variable",
         "normal stress condition",
     ),
-    Slot("fluid", fluid.Fluid, fluid.BUILT_IN_PARTS, "drained", "fluid in the pores of the fault"),
-    Slot(
+    PartSlot(
+        "fluid",
+        fluid.Fluid,
+        fluid.BUILT_IN_FLUID_CLASS_BY_NAME,
+        "drained",
+        "fluid in the pores of the fault",
+    ),
+    PartSlot(
         "dynamics",
         dynamics.Dynamics,
-        dynamics.BUILT_IN_PARTS,
+        dynamics.BUILT_IN_DYNAMICS_CLASS_BY_NAME,
         "quasi_static",
         "force that balances the spring in addition to friction",
     ),
-    Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "motion of the load point"),
-    Slot(
+    PartSlot(
+        "loading",
+        loading.Loading,
+        loading.BUILT_IN_LOADING_CLASS_BY_NAME,
+        "step",
+        "motion of the load point",
+    ),
+    PartSlot(
         "temperature",
         temperature.Temperature,
-        temperature.BUILT_IN_PARTS,
+        temperature.BUILT_IN_TEMPERATURE_CLASS_BY_NAME,
         "isothermal",
         "temperature of the fault",
         omit_if_default=True,
     ),
-    Slot(
+    PartSlot(
         "loading_noise",
         noise.Noise,
-        noise.BUILT_IN_PARTS,
+        noise.BUILT_IN_NOISE_CLASS_BY_NAME,
         "none",
         "noise that is added to the loading",
         omit_if_default=True,
@@ -111,20 +128,20 @@ SLOTS: tuple[Slot, ...] = (
 #: Slots whose part is selected by name. In the other slots, the values of fields such as
 #: ``inertia`` select the part.
 SLOTS_WITH_PART_CHOSEN_BY_NAME = tuple(
-    slot for slot in SLOTS if not slot.part_class_by_selecting_field
+    slot for slot in PART_SLOTS if not slot.part_class_by_selecting_field
 )
 _ALL_PART_CLASSES: tuple[type[Part], ...] = (
     SliderParameters,
-    *(part for slot in SLOTS for part in slot.built_in_parts.values()),
+    *(part for slot in PART_SLOTS for part in slot.built_in_parts.values()),
 )
 #: Mapping from field names to the built-in parts that declare the fields.
 PART_CLASS_BY_FIELD_NAME: Mapping[str, type[Part]] = {
-    name: part for part in reversed(_ALL_PART_CLASSES) for name in field_names(part)
+    name: part for part in reversed(_ALL_PART_CLASSES) for name in list_part_field_names(part)
 }
 #: Quantities that describe the fields of a scene.
 SCENE_FIELD_QUANTITIES: tuple[Quantity, ...] = (
-    *(slot.field_quantity for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME),
-    *(about for part in _ALL_PART_CLASSES for about in part_field_quantities(part)),
+    *(slot.part_name_field_quantity for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME),
+    *(about for part in _ALL_PART_CLASSES for about in list_part_field_quantities(part)),
 )
 #: Names of the fields of a scene.
 SCENE_FIELD_NAMES: tuple[str, ...] = tuple(
@@ -132,8 +149,8 @@ SCENE_FIELD_NAMES: tuple[str, ...] = tuple(
 )
 #: Fields that were added in later versions of rsfstudy, with their default values. Scenes list such
 #: a field only if it has a value. The keys of cells and stored scenes also omit the default value.
-OMITTED_DEFAULTS: dict[str, Any] = {
-    **{slot.name: slot.default_part_name for slot in SLOTS if slot.omit_if_default},
+DEFAULTS_OMITTED_FROM_STORED_SCENES: dict[str, Any] = {
+    **{slot.name: slot.default_part_name for slot in PART_SLOTS if slot.omit_if_default},
     **{
         name: part.__dataclass_fields__[name].default
         for name, part in PART_CLASS_BY_FIELD_NAME.items()
@@ -141,14 +158,14 @@ OMITTED_DEFAULTS: dict[str, Any] = {
     },
 }
 #: Names of the slots.
-SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
+PART_SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in PART_SLOTS)
 #: Names of the fields whose values select a part.
 PART_SELECTING_FIELDS: tuple[str, ...] = tuple(
-    name for slot in SLOTS for name in slot.part_class_by_selecting_field
+    name for slot in PART_SLOTS for name in slot.part_class_by_selecting_field
 )
 
 
-def scene_field_defaults() -> dict[str, Any]:
+def collect_scene_field_defaults() -> dict[str, Any]:
     """Return the default values of all fields of a scene.
 
     Returns
@@ -159,7 +176,7 @@ def scene_field_defaults() -> dict[str, Any]:
     """
     choices = {
         slot.name: slot.default_part_name if slot in SLOTS_WITH_PART_CHOSEN_BY_NAME else None
-        for slot in SLOTS
+        for slot in PART_SLOTS
     }
     fields = {
         name: part.__dataclass_fields__[name].default
@@ -192,7 +209,7 @@ def add_scene_fields_to_signature(
     def decorate(function: DecoratedFunction) -> DecoratedFunction:
         stated = signature(function)
         *first, last = stated.parameters.values()
-        names = (*scene_field_defaults(), *extra_field_names)
+        names = (*collect_scene_field_defaults(), *extra_field_names)
         fields = [Parameter(name, Parameter.KEYWORD_ONLY, default=...) for name in names]
         function.__signature__ = stated.replace(parameters=[*first, *fields, last])  # type: ignore[attr-defined]
         return function
@@ -204,12 +221,12 @@ def add_scene_fields_to_signature(
 
 #: Names of the attributes that every scene has in addition to its fields. The module ``scene`` adds
 #: the names to this set.
-RESERVED_NAMES: set[str] = set()
+RESERVED_SCENE_ATTRIBUTE_NAMES: set[str] = set()
 #: Classes of user-defined parts that have been checked.
-_CHECKED_PART_CLASSES: set[type[Part]] = set()
+_CHECKED_USER_PART_CLASSES: set[type[Part]] = set()
 
 
-def class_of_part(part: UserPart) -> type[Part]:
+def get_part_class(part: UserPart) -> type[Part]:
     """Return the class of a part.
 
     Parameters
@@ -225,7 +242,7 @@ def class_of_part(part: UserPart) -> type[Part]:
     return part if isinstance(part, type) else type(part)
 
 
-def find_slot_of_part_class(part_class: type[Part]) -> Slot:
+def find_slot_of_part_class(part_class: type[Part]) -> PartSlot:
     """Return the slot that a part class can fill.
 
     Parameters
@@ -238,10 +255,10 @@ def find_slot_of_part_class(part_class: type[Part]) -> Slot:
     Slot
         Slot from whose base class the part is derived.
     """
-    return next(slot for slot in SLOTS if issubclass(part_class, slot.base_class))
+    return next(slot for slot in PART_SLOTS if issubclass(part_class, slot.base_class))
 
 
-def check_and_register_part(slot: Slot, part: Any) -> UserPart:
+def check_and_register_part(slot: PartSlot, part: Any) -> UserPart:
     """Check and register a part that is passed as a class or an object.
 
     Parameters
@@ -266,13 +283,13 @@ def check_and_register_part(slot: Slot, part: Any) -> UserPart:
         return found
     if isinstance(part, UserLoading) and slot.base_class is loading.Loading:
         _check_part_name(slot, part)
-    elif part not in _CHECKED_PART_CLASSES or find_slot_of_part_class(part) is not slot:
+    elif part not in _CHECKED_USER_PART_CLASSES or find_slot_of_part_class(part) is not slot:
         _check_user_part(slot, part)
     register_user_parts([found])
     return found
 
 
-def _check_user_part(slot: Slot, part: Any) -> None:
+def _check_user_part(slot: PartSlot, part: Any) -> None:
     """Raise ``InvalidValue`` if a class cannot fill a slot."""
     if not isinstance(part, type) or not issubclass(part, slot.base_class):
         rule = f"is not a class that defines the {slot.name} of a scene"
@@ -296,7 +313,7 @@ def _check_user_part(slot: Slot, part: Any) -> None:
             raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def _check_unknowns_excluded_from_distance(slot: Slot, part: type[Part]) -> None:
+def _check_unknowns_excluded_from_distance(slot: PartSlot, part: type[Part]) -> None:
     """Raise ``InvalidValue`` if ``excluded_from_distance`` is invalid.
 
     Each name in ``excluded_from_distance`` must be the name of an unknown of the part.
@@ -312,38 +329,38 @@ def _check_unknowns_excluded_from_distance(slot: Slot, part: type[Part]) -> None
             raise InvalidValue("excluded_from_distance", name, rule, choices=unknowns)
 
 
-def _check_part_name(slot: Slot, part: UserPart) -> None:
+def _check_part_name(slot: PartSlot, part: UserPart) -> None:
     """Raise ``InvalidValue`` if the name of a part is invalid or in use."""
     name: object = getattr(part, "name", None)
     rule = (
         ""
-        if is_variable_name(name)
+        if is_valid_variable_name(name)
         else (f"must have a Python identifier as its name (got {name!r})")
     )
-    for other in SLOTS:
+    for other in PART_SLOTS:
         if name in other.built_in_parts:
             rule = f"has the name {name!r} of a part of rsfstudy"
-        elif name in other.user_parts and _module_and_qualified_name(
+        elif name in other.user_parts and _get_module_and_qualified_name(
             other.user_parts[name]
-        ) != _module_and_qualified_name(part):
+        ) != _get_module_and_qualified_name(part):
             rule = (
                 f"has the name {name!r} of "
-                f"{'.'.join(_module_and_qualified_name(other.user_parts[name]))}"
+                f"{'.'.join(_get_module_and_qualified_name(other.user_parts[name]))}"
             )
     if rule:
-        remedy = f'Define another name = "..." in {_module_and_qualified_name(part)[1]}.'
+        remedy = f'Define another name = "..." in {_get_module_and_qualified_name(part)[1]}.'
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def _module_and_qualified_name(part: UserPart) -> tuple[str, str]:
+def _get_module_and_qualified_name(part: UserPart) -> tuple[str, str]:
     """Return the module and the qualified name under which a part is defined.
 
     The names do not change if a notebook cell with the definition is run again.
     """
-    return class_of_part(part).__module__, class_of_part(part).__qualname__
+    return get_part_class(part).__module__, get_part_class(part).__qualname__
 
 
-def _check_part_fields(slot: Slot, part: type[Part]) -> None:
+def _check_part_fields(slot: PartSlot, part: type[Part]) -> None:
     """Raise ``InvalidValue`` if a field of a part is invalid.
 
     A field of a part must have a description. The name of the field must not be in use.
@@ -361,11 +378,11 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
                 ("Declare the field with number() or flag()."),
             )
             raise InvalidValue(what, name, rule, remedy=state)
-        if not is_variable_name(name):
+        if not is_valid_variable_name(name):
             rule = "must be a Python identifier in Unicode normalisation form NFC"
             raise InvalidValue(what, name, rule)
         if owner is None:
-            taken = name in RESERVED_NAMES | SLOT_NAMES
+            taken = name in RESERVED_SCENE_ATTRIBUTE_NAMES | PART_SLOT_NAMES
         else:  # Another part of the slot may declare the field with a different rule.
             known = owner.__dataclass_fields__[name].metadata["about"]
             taken = about != known or owner not in slot.built_in_parts.values()
@@ -386,13 +403,13 @@ def register_user_parts(parts: Iterable[UserPart]) -> None:
         Parts to register.
     """
     for part in parts:
-        slot = find_slot_of_part_class(class_of_part(part))
+        slot = find_slot_of_part_class(get_part_class(part))
         if slot.user_parts.get(part.name) is not part:
             slot.user_parts[part.name] = part
-            _CHECKED_PART_CLASSES.add(class_of_part(part))
+            _CHECKED_USER_PART_CLASSES.add(get_part_class(part))
 
 
-def normalise_field_value(field_name: str, value: Any) -> Any:
+def replace_part_or_alias_by_part_name(field_name: str, value: Any) -> Any:
     """Convert a part class, or a synonym of a law, to the name of the part.
 
     Parameters
@@ -412,10 +429,14 @@ def normalise_field_value(field_name: str, value: Any) -> Any:
     InvalidValue
         If the part cannot fill the slot.
     """
-    for slot in SLOTS if isinstance(value, type | UserLoading) else ():
+    for slot in PART_SLOTS if isinstance(value, type | UserLoading) else ():
         if slot.name == field_name:
             return check_and_register_part(slot, value).name
-    return canonical_law_name(value) if field_name == "law" and isinstance(value, str) else value
+    return (
+        replace_law_alias_by_law_name(value)
+        if field_name == "law" and isinstance(value, str)
+        else value
+    )
 
 
 def replace_names_by_user_parts(
@@ -439,7 +460,7 @@ def replace_names_by_user_parts(
         return field_values
     texts = {
         n: field_values[n]
-        for n in SLOT_NAMES & set(field_values)
+        for n in PART_SLOT_NAMES & set(field_values)
         if isinstance(field_values[n], str)
     }
     return {
@@ -448,7 +469,7 @@ def replace_names_by_user_parts(
     }
 
 
-def scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, Quantity]:
+def collect_scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, Quantity]:
     """Return all fields of scenes, including the fields of user-defined parts.
 
     Parameters
@@ -467,15 +488,18 @@ def scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, Quantity
         If two parts have different fields with the same name.
     """
     found = {about.name: about for about in SCENE_FIELD_QUANTITIES}
-    for kind in map(class_of_part, user_parts):
-        for about in (find_slot_of_part_class(kind).field_quantity, *part_field_quantities(kind)):
+    for kind in map(get_part_class, user_parts):
+        for about in (
+            find_slot_of_part_class(kind).part_name_field_quantity,
+            *list_part_field_quantities(kind),
+        ):
             if found.setdefault(about.name, about) != about:
                 rule = "is already the name of a field of another part"
                 raise InvalidValue(f"field of {kind.name}", about.name, rule)
     return found
 
 
-def scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
+def collect_scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
     """Return the types of the fields of scenes.
 
     Parameters
@@ -488,28 +512,30 @@ def scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
     mapping of str to type
         Types by field name. The type includes None if some parts of the slot lack the field.
     """
-    kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
-    classes = tuple(map(class_of_part, user_parts))
+    kinds: dict[str, Any] = dict.fromkeys(PART_SLOT_NAMES, str)
+    classes = tuple(map(get_part_class, user_parts))
     filling: dict[str, list[type[Part]]] = {"": [SliderParameters]}
-    filling |= {slot.name: [*slot.built_in_parts.values()] for slot in SLOTS}
+    filling |= {slot.name: [*slot.built_in_parts.values()] for slot in PART_SLOTS}
     for own_kind in classes:
         filling[find_slot_of_part_class(own_kind).name].append(own_kind)
     for every in filling.values():
         for part in every:
-            for name in field_names(part):
+            for name in list_part_field_names(part):
                 kind: Any = bool if is_boolean_field(part, name) else float
-                stated = name == part.selected_by or all(name in field_names(one) for one in every)
-                stated = stated and name not in OMITTED_DEFAULTS
+                stated = name == part.selected_by or all(
+                    name in list_part_field_names(one) for one in every
+                )
+                stated = stated and name not in DEFAULTS_OMITTED_FROM_STORED_SCENES
                 default = part.__dataclass_fields__[name].default
                 kinds[name] = kind if stated and default is not None else kind | None
-    return {name: kinds[name] for name in scene_field_quantities(classes)}
+    return {name: kinds[name] for name in collect_scene_field_quantities(classes)}
 
 
 #: Types of the fields of scenes without user-defined parts.
-SCENE_FIELD_TYPES = scene_field_types(())
+SCENE_FIELD_TYPES = collect_scene_field_types(())
 
 
-def quantities_with_values(
+def iterate_quantities_with_values(
     field_values: Mapping[str, Any], user_parts: Iterable[UserPart] = ()
 ) -> Iterator[tuple[Quantity, object]]:
     """Iterate over the fields that have a value.
@@ -528,7 +554,7 @@ def quantities_with_values(
     value : object
         Value of the field, which is not None.
     """
-    about = scene_field_quantities(user_parts)
+    about = collect_scene_field_quantities(user_parts)
     for name, value in field_values.items():
         if value is not None:
             yield about.get(name, Quantity(name, "", "", "")), value

@@ -49,11 +49,11 @@ POSITIVE, NON_NEGATIVE = "must be greater than 0", "must be 0 or greater"
 NON_NEGATIVE_INTEGER, POSITIVE_INTEGER = (
     f"must be a whole number from {least} to 100,000" for least in (0, 1)
 )
-_BOOLEAN_RULE = "must be true or false"
+_BOOLEAN_FIELD_RULE_TEXT = "must be true or false"
 
 #: Function of floats whose last argument is the parameter tuple of a scene.
-Function = Callable[..., Any]
-Numbers = tuple[float, ...]
+NumericFunction = Callable[..., Any]
+FloatTuple = tuple[float, ...]
 
 
 @add_former_member_names
@@ -99,8 +99,8 @@ class Part:
     needs: ClassVar[Collection[str]] = frozenset()
     #: Names of the quantities that the functions of the part receive.
     received_quantities: ClassVar[frozenset[str]] = frozenset()
-    auxiliary_rates: ClassVar[Function | None] = None
-    auxiliary_steady_states: ClassVar[Function | None] = None
+    auxiliary_rates: ClassVar[NumericFunction | None] = None
+    auxiliary_steady_states: ClassVar[NumericFunction | None] = None
     #: Texts for error messages about a field that belongs to another part: the condition under
     #: which the field does not apply, and a remedy.
     rejection_hint: ClassVar[tuple[str, str]] = ("", "")
@@ -120,7 +120,7 @@ class Part:
                 if name not in vars(cls):
                     setattr(cls, name, vars(base)[name])
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the values that the functions of the part read from ``p``.
 
         The first value is stored at the index of the slot. A law can have any number of values. For
@@ -303,7 +303,9 @@ def flag(default: bool, long_name: str) -> Any:
     True
     """
     about = {"symbol": "", "units": "", "long_name": long_name}
-    return field(default=default, metadata={"about": about, "rule": _BOOLEAN_RULE, "remedy": ""})
+    return field(
+        default=default, metadata={"about": about, "rule": _BOOLEAN_FIELD_RULE_TEXT, "remedy": ""}
+    )
 
 
 #: Mapping from the text of each validation rule to the function that checks the rule.
@@ -334,10 +336,12 @@ def is_boolean_field(part_class: type[Part], field_name: str) -> bool:
     bool
         True for fields that ``flag`` declares.
     """
-    return bool(part_class.__dataclass_fields__[field_name].metadata["rule"] == _BOOLEAN_RULE)
+    return bool(
+        part_class.__dataclass_fields__[field_name].metadata["rule"] == _BOOLEAN_FIELD_RULE_TEXT
+    )
 
 
-def field_names(part_class: type[Part]) -> tuple[str, ...]:
+def list_part_field_names(part_class: type[Part]) -> tuple[str, ...]:
     """Return the names of the fields that a part adds to a scene.
 
     Parameters
@@ -357,7 +361,7 @@ def field_names(part_class: type[Part]) -> tuple[str, ...]:
 
 
 @cache
-def _fields_appended_to_parameter_values(part_class: type[Part]) -> tuple[str, ...]:
+def _list_fields_appended_to_parameters(part_class: type[Part]) -> tuple[str, ...]:
     """Return the names of the fields that are appended to ``parameter_values``.
 
     A field is appended if it is numeric and is declared in a subclass of the class that defines
@@ -367,12 +371,12 @@ def _fields_appended_to_parameter_values(part_class: type[Part]) -> tuple[str, .
     known = vars(overriding).get("__dataclass_fields__", {})
     return tuple(
         name
-        for name in field_names(part_class)
+        for name in list_part_field_names(part_class)
         if name not in known and not is_boolean_field(part_class, name)
     )
 
 
-def collect_parameter_values(part: Part, scene: SceneView) -> Numbers:
+def collect_parameter_values(part: Part, scene: SceneView) -> FloatTuple:
     """Return ``part.parameter_values``, followed by the appended fields.
 
     Parameters
@@ -388,14 +392,14 @@ def collect_parameter_values(part: Part, scene: SceneView) -> Numbers:
         Parameters of the part. Fields without a value are NaN.
     """
     own = tuple(part.parameter_values(scene))
-    appended = _fields_appended_to_parameter_values(type(part))  # type: ignore[arg-type]
+    appended = _list_fields_appended_to_parameters(type(part))  # type: ignore[arg-type]
     if not appended:
         return own
     values = [getattr(part, name) for name in appended]
     return (*own, *[math.nan if value is None else float(value) for value in values])
 
 
-def part_field_quantities(part_class: type[Part]) -> list[Quantity]:
+def list_part_field_quantities(part_class: type[Part]) -> list[Quantity]:
     """Return the quantities that describe the fields of a part.
 
     Parameters
@@ -408,12 +412,12 @@ def part_field_quantities(part_class: type[Part]) -> list[Quantity]:
     list of Quantity
         Quantities with the names, symbols and units of the fields.
     """
-    stated = (part_class.__dataclass_fields__[name] for name in field_names(part_class))
+    stated = (part_class.__dataclass_fields__[name] for name in list_part_field_names(part_class))
     return [Quantity(f.name, **f.metadata["about"]) for f in stated]
 
 
 @cache
-def _field_validation_rule(
+def _get_field_validation_rule(
     part_class: type[Part], field_name: str
 ) -> tuple[Any, str, str, Callable[[float], bool] | None]:
     """Return the default, rule, remedy and condition of a field."""
@@ -444,13 +448,13 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
     InvalidValue
         If the value has the wrong type, is not finite or violates the rule of the field.
     """
-    default, rule, remedy, allows = _field_validation_rule(part_class, field_name)  # type: ignore[arg-type]
+    default, rule, remedy, allows = _get_field_validation_rule(part_class, field_name)  # type: ignore[arg-type]
     if type(value) is float and math.isfinite(value) and allows and allows(value):
         return value  # This shortcut accepts most values.
     if value is None and default is None:
         return None
     flagged = type(value).__name__ == "bool"  # NumPy booleans have the same type name.
-    if rule == _BOOLEAN_RULE:
+    if rule == _BOOLEAN_FIELD_RULE_TEXT:
         if not flagged:
             raise InvalidValue(field_name, value, rule)
         return bool(value)

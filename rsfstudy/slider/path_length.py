@@ -26,11 +26,11 @@ from __future__ import annotations
 import math
 
 from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 
 #: Lower limit of ln(V/V_*), equal to the natural logarithm of 10^-290. If the load point does not
 #: move, a motion ends at this slip rate.
-STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
+LOG_SLIP_RATE_OF_STOPPED_SLIP = -290.0 * math.log(10.0)
 
 #: Upper limit of ln(V_0/V). The rate functions replace larger values by this limit. The contact is
 #: then treated as stationary, because the neglected slip changes the state by a relative amount
@@ -43,12 +43,12 @@ LOG_SLIP_RATE_PER_PATH_LENGTH = 6.0
 #: Largest slope of the path for which the square of the slope is computed. The slope is the
 #: derivative of (ln V)/6 with respect to displacement or inertial time. For a larger slope, 1 plus
 #: the square of the slope equals the square in double precision.
-MAX_FINITE_PATH_SLOPE = 1e9
+MAX_PATH_SLOPE_WITH_FINITE_SQUARE = 1e9
 
 VelocityRatios = tuple[float, float, float]
 
 
-def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
+def compute_velocity_ratios(log_slip_rate: float, p: FloatTuple) -> VelocityRatios:
     r"""Compute the slip rate and its ratios to the load point velocity.
 
     Parameters
@@ -81,7 +81,7 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
     return x, slower, 1.0 / (1.0 + slower)
 
 
-def time_per_displacement(velocity_ratio_values: VelocityRatios, p: Numbers) -> float:
+def compute_time_per_displacement(velocity_ratio_values: VelocityRatios, p: FloatTuple) -> float:
     """Compute the derivative of time with respect to displacement.
 
     Parameters
@@ -99,11 +99,14 @@ def time_per_displacement(velocity_ratio_values: VelocityRatios, p: Numbers) -> 
     x, slower, fraction = velocity_ratio_values
     if p[LOAD_VELOCITY] != 0.0:
         return slower * fraction / abs(p[LOAD_VELOCITY])
-    return math.exp(-max(x, STOPPED_LOG_SLIP_RATE))
+    return math.exp(-max(x, LOG_SLIP_RATE_OF_STOPPED_SLIP))
 
 
-def spring_stress_rate(
-    load: float, slip: float, velocity_ratio_values: VelocityRatios, p: Numbers
+def compute_spring_stress_rate(
+    relative_load_velocity: float,
+    relative_slip_rate: float,
+    velocity_ratio_values: VelocityRatios,
+    p: FloatTuple,
 ) -> float:
     r"""Compute the derivative of the spring stress with respect to displacement.
 
@@ -121,22 +124,27 @@ def spring_stress_rate(
     float
         Derivative :math:`K (V_0 - V)/(V + V_0)`.
     """
-    return p[STIFFNESS] * (load - slip) * velocity_ratio_values[2]
+    return p[STIFFNESS] * (relative_load_velocity - relative_slip_rate) * velocity_ratio_values[2]
 
 
-def spring_stress_rate_with_noise(
-    load: float, slip: float, velocity_ratio_values: VelocityRatios, p: Numbers
+def compute_spring_stress_rate_with_noise(
+    relative_load_velocity: float,
+    relative_slip_rate: float,
+    velocity_ratio_values: VelocityRatios,
+    p: FloatTuple,
 ) -> float:
     """Compute the derivative of the spring stress in a scene with noise.
 
     The last parameter of the scene is the rate at which noise changes the spring stress. See
     `spring_stress_rate` for the arguments.
     """
-    steady = spring_stress_rate(load, slip, velocity_ratio_values, p)
-    return steady + p[-1] * time_per_displacement(velocity_ratio_values, p)
+    steady = compute_spring_stress_rate(
+        relative_load_velocity, relative_slip_rate, velocity_ratio_values, p
+    )
+    return steady + p[-1] * compute_time_per_displacement(velocity_ratio_values, p)
 
 
-def displacement_per_path_length(path_slope: float) -> float:
+def compute_displacement_per_path_length(path_slope: float) -> float:
     r"""Compute the derivative of displacement with respect to path length.
 
     Parameters
@@ -151,6 +159,6 @@ def displacement_per_path_length(path_slope: float) -> float:
     float
         Derivative of displacement (or inertial time) with respect to path length.
     """
-    if abs(path_slope) > MAX_FINITE_PATH_SLOPE:
+    if abs(path_slope) > MAX_PATH_SLOPE_WITH_FINITE_SQUARE:
         return 1.0 / abs(path_slope)
     return 1.0 / math.sqrt(1.0 + path_slope * path_slope)

@@ -14,11 +14,13 @@ from functools import cache
 from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parameter_layout import MU_STAR, A
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 
 
 @cache
-def build_motion_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
+def build_motion_point_assembling_function(
+    friction_functions: FrictionFunctions,
+) -> NumericFunction:
     r"""Return a function that creates a ``MotionPoint`` from stresses and states.
 
     Parameters
@@ -59,11 +61,11 @@ def build_motion_point_assembling_function(friction_functions: FrictionFunctions
     def point_at(
         x: float,
         growth: float,
-        forces: Numbers,
-        psis: Numbers,
-        changes: Numbers,
+        forces: FloatTuple,
+        psis: FloatTuple,
+        changes: FloatTuple,
         shift: float,
-        p: Numbers,
+        p: FloatTuple,
     ) -> MotionPoint:
         f, f_change, g, g_change = forces
         steady = steady_states(x, shift, p)
@@ -98,9 +100,9 @@ def build_motion_point_assembling_function(friction_functions: FrictionFunctions
 @cache
 def build_point_function_between_ruptures(
     friction_functions: FrictionFunctions,
-    force_balance_function: Function,
-    log_slip_rate_growth_function: Function,
-) -> Function:
+    force_balance_function: NumericFunction,
+    log_slip_rate_growth_function: NumericFunction,
+) -> NumericFunction:
     """Return a function for the stress, slip rate and states between ruptures.
 
     The class ``Dynamics`` documents the functions ``(spring, psis, p)`` and ``(unknowns, rates, x,
@@ -114,11 +116,11 @@ def build_point_function_between_ruptures(
     assemble_point = build_motion_point_assembling_function(friction_functions)
     strength, contribution, end = (
         friction_functions.strength,
-        friction_functions.state_contribution,
+        friction_functions.state_contribution_to_friction,
         1 + friction_functions.state_count,
     )
 
-    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
+    def point(state: FloatTuple, rates: FloatTuple, p: FloatTuple) -> MotionPoint:
         unknowns, changes = state[:end], rates[1:end]
         f, psis = unknowns[0], unknowns[1:]
         x, g, _shift = force_balance_function(f, psis, p)
@@ -131,7 +133,7 @@ def build_point_function_between_ruptures(
 
 
 @cache
-def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> Function:
+def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> NumericFunction:
     """Return a function for the stress, slip rate and states in ruptures."""
     assemble_point = build_motion_point_assembling_function(friction_functions)
     strength, states_at, end = (
@@ -140,7 +142,7 @@ def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> Fu
         2 + friction_functions.state_count,
     )
 
-    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
+    def point(state: FloatTuple, rates: FloatTuple, p: FloatTuple) -> MotionPoint:
         f, x, g, others = state[0], state[1], state[2], state[3:end]
         value, _slope, shift, _shift_slope = strength(g, others, p)
         psis = states_at(value, x, others, p)
@@ -150,7 +152,7 @@ def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> Fu
 
 
 @cache
-def build_point_function_of_rigid_slider(friction_functions: FrictionFunctions) -> Function:
+def build_point_function_of_rigid_slider(friction_functions: FrictionFunctions) -> NumericFunction:
     """Return a function for the stress, slip rate and states of a rigid slider.
 
     The spring stress f of a rigid slider is equal to the frictional stress g.
@@ -158,7 +160,7 @@ def build_point_function_of_rigid_slider(friction_functions: FrictionFunctions) 
     assemble_point = build_motion_point_assembling_function(friction_functions)
     strength, states_at = friction_functions.strength, friction_functions.states_from_strength
 
-    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
+    def point(state: FloatTuple, rates: FloatTuple, p: FloatTuple) -> MotionPoint:
         g, others, x = state[0], state[1:], p[-1]
         value, _slope, shift, _shift_slope = strength(g, others, p)
         psis = states_at(value, x, others, p)

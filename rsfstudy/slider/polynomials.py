@@ -16,12 +16,12 @@ from rsfstudy.slider.evolution_derivatives import NestedListMatrix
 
 #: Number of Newton iterations for the roots of a polynomial in which one root is much larger than
 #: the other roots.
-_NEWTON_STEPS = 2
+_ROOT_NEWTON_ITERATION_COUNT = 2
 
 PolynomialCoefficients = list[float]
 
 
-def dot_product(first: Sequence[float], second: Sequence[float]) -> float:
+def compute_dot_product(first: Sequence[float], second: Sequence[float]) -> float:
     """Compute the scalar product of two sequences."""
     return sum(map(mul, first, second))
 
@@ -51,7 +51,7 @@ def compute_resolvent_polynomials(
     coefficients, terms = [1.0], [[[float(i == j) for j in places] for i in places]]
     for order in range(1, len(matrix) + 1):
         columns = list(zip(*terms[0], strict=True))
-        term = [[dot_product(row, column) for column in columns] for row in matrix]
+        term = [[compute_dot_product(row, column) for column in columns] for row in matrix]
         coefficients.insert(0, -sum(term[i][i] for i in places) / order)
         for i in places:
             term[i][i] += coefficients[0]
@@ -69,7 +69,7 @@ def find_roots_with_one_distant_root(polynomial: PolynomialCoefficients) -> np.n
     """
     falling = polynomial[::-1]
     roots = np.append(np.roots(falling[1:]), -falling[1] / falling[0]).astype(complex)
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(_ROOT_NEWTON_ITERATION_COUNT):
         off, slope = np.polyval(falling, roots), np.polyval(np.polyder(falling), roots)
         roots -= np.divide(off, slope, out=np.zeros_like(roots), where=slope != 0.0)
     return roots
@@ -111,7 +111,7 @@ def evaluate_polynomial(polynomial: PolynomialCoefficients, argument: float) -> 
     return math.fsum([x * argument**n for n, x in enumerate(polynomial)])
 
 
-def positive_real_roots(polynomial: PolynomialCoefficients) -> list[float]:
+def find_positive_real_roots(polynomial: PolynomialCoefficients) -> list[float]:
     """Find the positive real roots of a polynomial."""
     while polynomial and polynomial[-1] == 0.0:
         polynomial = polynomial[:-1]

@@ -26,24 +26,24 @@ from functools import cache
 
 from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, MU_STAR, A
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 from rsfstudy.slider.path_length import (
     LOG_SLIP_RATE_PER_PATH_LENGTH,
     VelocityRatios,
-    displacement_per_path_length,
-    spring_stress_rate_with_noise,
-    time_per_displacement,
-    velocity_ratios,
+    compute_displacement_per_path_length,
+    compute_spring_stress_rate_with_noise,
+    compute_time_per_displacement,
+    compute_velocity_ratios,
 )
 from rsfstudy.slider.state_functions import build_tuple_scaling_function
 
 
-def build_displacement_rate_function(
+def build_rate_function_by_displacement(
     friction_functions: FrictionFunctions,
-    force_balance_function: Function,
+    force_balance_function: NumericFunction,
     *,
     allows_reversed_slip: bool,
-) -> Function:
+) -> NumericFunction:
     r"""Return a function for the derivatives with respect to displacement.
 
     The returned function ``(state, p)`` computes the derivative of the spring stress, the
@@ -56,21 +56,23 @@ def build_displacement_rate_function(
     the sign of the shear stress.
     """
     evolutions, imposed, end = (
-        friction_functions.evolutions,
+        friction_functions.state_evolutions,
         friction_functions.load_point_stress,
         1 + friction_functions.state_count,
     )
     spring_stress_rate = friction_functions.spring_stress_rate
 
-    def forward_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
+    def forward_rates(state: FloatTuple, p: FloatTuple) -> tuple[float, FloatTuple, VelocityRatios]:
         psis = state[1:end]
         log_slip_rate, _g, shift = force_balance_function(state[0], psis, p)
-        ratios = velocity_ratios(log_slip_rate, p)
+        ratios = compute_velocity_ratios(log_slip_rate, p)
         x, slower, fraction = ratios
         loading = spring_stress_rate(slower, 1.0, ratios, p)
         return loading, evolutions(x, psis, shift, fraction, p), ratios
 
-    def reversible_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
+    def reversible_rates(
+        state: FloatTuple, p: FloatTuple
+    ) -> tuple[float, FloatTuple, VelocityRatios]:
         _loading, changes, ratios = forward_rates(state, p)
         slower = ratios[1]
         slip = math.copysign(1.0, p[MU_STAR] + state[0] + imposed(state[1:end], p))
@@ -83,10 +85,10 @@ def build_displacement_rate_function(
 @cache
 def build_rate_functions_between_ruptures(
     friction_functions: FrictionFunctions,
-    force_balance_function: Function,
+    force_balance_function: NumericFunction,
     *,
     allows_reversed_slip: bool,
-) -> tuple[Function, Function, Function]:
+) -> tuple[NumericFunction, NumericFunction, NumericFunction]:
     """Return the rate functions of a scene between ruptures.
 
     Parameters
@@ -108,27 +110,31 @@ def build_rate_functions_between_ruptures(
         friction_functions.state_sum,
         build_tuple_scaling_function(friction_functions.state_count),
     )
-    displacement_rate_function = build_displacement_rate_function(
+    displacement_rate_function = build_rate_function_by_displacement(
         friction_functions, force_balance_function, allows_reversed_slip=allows_reversed_slip
     )
 
-    def rates_by_displacement(state: Numbers, p: Numbers) -> Numbers:
+    def rates_by_displacement(state: FloatTuple, p: FloatTuple) -> FloatTuple:
         loading, changes, _ratios = displacement_rate_function(state, p)
         return (loading, *changes)
 
-    def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
+    def rates_along_path(state: FloatTuple, p: FloatTuple) -> FloatTuple:
         loading, changes, _ratios = displacement_rate_function(state, p)
-        along = displacement_per_path_length(
+        along = compute_displacement_per_path_length(
             (loading - state_sum(changes)) / (LOG_SLIP_RATE_PER_PATH_LENGTH * p[A])
         )
         return (along * loading, *times(changes, along))
 
-    def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+    def rates_along_path_with_time(state: FloatTuple, p: FloatTuple) -> FloatTuple:
         loading, changes, ratios = displacement_rate_function(state, p)
-        along = displacement_per_path_length(
+        along = compute_displacement_per_path_length(
             (loading - state_sum(changes)) / (LOG_SLIP_RATE_PER_PATH_LENGTH * p[A])
         )
-        return (along * loading, *times(changes, along), along * time_per_displacement(ratios, p))
+        return (
+            along * loading,
+            *times(changes, along),
+            along * compute_time_per_displacement(ratios, p),
+        )
 
     return rates_by_displacement, rates_along_path, rates_along_path_with_time
 
@@ -136,8 +142,8 @@ def build_rate_functions_between_ruptures(
 @cache
 def build_rate_functions_in_rupture(
     friction_functions: FrictionFunctions,
-    build_rupture_rate_function: Callable[[FrictionFunctions], Function],
-) -> tuple[Function, Function, Function]:
+    build_rupture_rate_function: Callable[[FrictionFunctions], NumericFunction],
+) -> tuple[NumericFunction, NumericFunction, NumericFunction]:
     r"""Return the rate functions of a scene in ruptures.
 
     Parameters
@@ -156,30 +162,32 @@ def build_rate_functions_in_rupture(
         third function appends the derivative of inertial time.
     """
     rupture_rate_function = build_rupture_rate_function(friction_functions)
-    if friction_functions.spring_stress_rate is spring_stress_rate_with_noise:
+    if friction_functions.spring_stress_rate is compute_spring_stress_rate_with_noise:
         rupture_rate_function = _add_noise_to_rupture_rates(rupture_rate_function)
     end = 2 + friction_functions.state_count
     times = build_tuple_scaling_function(end)
 
-    def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
+    def rates_along_path(state: FloatTuple, p: FloatTuple) -> FloatTuple:
         by = rupture_rate_function(state, p)
-        return times(by, displacement_per_path_length(by[1] / LOG_SLIP_RATE_PER_PATH_LENGTH))
+        return times(
+            by, compute_displacement_per_path_length(by[1] / LOG_SLIP_RATE_PER_PATH_LENGTH)
+        )
 
-    def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+    def rates_along_path_with_time(state: FloatTuple, p: FloatTuple) -> FloatTuple:
         by = rupture_rate_function(state[:end], p)
-        along = displacement_per_path_length(by[1] / LOG_SLIP_RATE_PER_PATH_LENGTH)
+        along = compute_displacement_per_path_length(by[1] / LOG_SLIP_RATE_PER_PATH_LENGTH)
         return (*times(by, along), along)
 
     return rupture_rate_function, rates_along_path, rates_along_path_with_time
 
 
-def _add_noise_to_rupture_rates(rupture_rate_function: Function) -> Function:
+def _add_noise_to_rupture_rates(rupture_rate_function: NumericFunction) -> NumericFunction:
     """Add the noise of the spring stress to the rates per inertial time.
 
     The last two parameters of a scene with noise are the inertial time and the rate of the noise.
     """
 
-    def rates_with_noise(state: Numbers, p: Numbers) -> Numbers:
+    def rates_with_noise(state: FloatTuple, p: FloatTuple) -> FloatTuple:
         by = rupture_rate_function(state, p)
         return (by[0] + p[-2] * p[-1], *by[1:])
 
@@ -187,7 +195,7 @@ def _add_noise_to_rupture_rates(rupture_rate_function: Function) -> Function:
 
 
 @cache
-def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -> Function:
+def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -> NumericFunction:
     r"""Return the rate function of a rigid slider.
 
     The returned function ``(state, p) -> tuple`` computes the derivatives with respect to slip of g
@@ -199,9 +207,12 @@ def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -
     :math:`\mathrm{strength}'(g) \, dg = d\Psi`.
     """
     strength, states_at = friction_functions.strength, friction_functions.states_from_strength
-    evolutions, contribution = friction_functions.evolutions, friction_functions.state_contribution
+    evolutions, contribution = (
+        friction_functions.state_evolutions,
+        friction_functions.state_contribution_to_friction,
+    )
 
-    def rigid_rate(state: Numbers, p: Numbers) -> Numbers:
+    def rigid_rate(state: FloatTuple, p: FloatTuple) -> FloatTuple:
         others = state[1:]
         value, slope, shift, _shift_slope = strength(state[0], others, p)
         changes = evolutions(p[-1], states_at(value, p[-1], others, p), shift, 1.0, p)

@@ -19,17 +19,17 @@ import numpy as np
 
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantities import Quantity, is_variable_name
+from rsfstudy.quantities import Quantity, is_valid_variable_name
 from rsfstudy.slider.loading import Segment, ramp
 from rsfstudy.slider.parameter_layout import SEGMENT_LOG_VELOCITY, SEGMENT_STRESS_FALL
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.user_loadings import UserLoading
 
 #: Columns of the sample table: time since the first sample, load point velocity after the sample,
 #: decrease in normal stress from sigma_* at the sample, and rate of normal stress after the sample.
 TIME_COLUMN, VELOCITY_COLUMN, STRESS_FALL_COLUMN, STRESS_RATE_COLUMN = range(4)
-_NORMAL_STRESS_UNKNOWNS = (
+_UNKNOWNS_OF_RECORDED_NORMAL_STRESS = (
     Quantity("recorded_fall", "$P$", "1", "imposed decrease of normal stress", "sigma_*"),
 )
 
@@ -83,16 +83,18 @@ class SampledHistory(UserLoading):
     """
 
     #: Number of columns of ``sample_table``.
-    COLUMN_COUNT: ClassVar[int] = STRESS_RATE_COLUMN + 1
+    SAMPLE_TABLE_COLUMN_COUNT: ClassVar[int] = STRESS_RATE_COLUMN + 1
 
-    samples: bytes = field(repr=False)
+    sample_table_bytes: bytes = field(repr=False)
     digest: str
     of_stress: bool
     of_pressure: bool = False  # type: ignore[misc]
-    first_reversal: tuple[str, float, str] | None = field(default=None, compare=False, repr=False)
+    first_load_point_reversal: tuple[str, float, str] | None = field(
+        default=None, compare=False, repr=False
+    )
 
-    auxiliary_rates = staticmethod(ramp.pending_normal_stress_rates)
-    auxiliary_steady_states = staticmethod(ramp.zero_pending_normal_stress)
+    auxiliary_rates = staticmethod(ramp.compute_remaining_normal_stress_rates)
+    auxiliary_steady_states = staticmethod(ramp.return_zero_remaining_normal_stress)
 
     @classmethod
     def from_samples(
@@ -103,7 +105,7 @@ class SampledHistory(UserLoading):
         name: str,
         *,
         of_pressure: bool = False,
-        first_reversal: tuple[str, float, str] | None = None,
+        first_load_point_reversal: tuple[str, float, str] | None = None,
     ) -> SampledHistory:
         r"""Build a loading history from samples.
 
@@ -134,7 +136,7 @@ class SampledHistory(UserLoading):
         InvalidValue
             If the name is not a Python identifier.
         """
-        if not is_variable_name(name):
+        if not is_valid_variable_name(name):
             raise InvalidValue(
                 "name", name, "must be a Python identifier, because it is the name of the history"
             )
@@ -146,7 +148,7 @@ class SampledHistory(UserLoading):
         history = cls.from_table(
             columns, normal_stress_fall is not None, name, of_pressure=of_pressure
         )
-        return replace(history, first_reversal=first_reversal)
+        return replace(history, first_reversal=first_load_point_reversal)
 
     @classmethod
     def from_table(
@@ -183,24 +185,28 @@ class SampledHistory(UserLoading):
         If normal stress is sampled, the decrease in normal stress is an unknown of the loading.
         Otherwise the loading has no unknowns.
         """
-        return _NORMAL_STRESS_UNKNOWNS if self.of_stress else ()
+        return _UNKNOWNS_OF_RECORDED_NORMAL_STRESS if self.of_stress else ()
 
-    def locate_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
+    def describe_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
         """Describe the input value that moves the load point backwards.
 
         See ``UserLoading.locate_load_point_reversal``.
         """
         velocity = float(self.sample_table[segment_index, VELOCITY_COLUMN])
-        return self.first_reversal or ("velocity", velocity, f"sample {segment_index + 1}")
+        return self.first_load_point_reversal or (
+            "velocity",
+            velocity,
+            f"sample {segment_index + 1}",
+        )
 
-    def initial_unknowns(self, scene: SceneView) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> FloatTuple:
         """Return the decrease in normal stress at the first sample.
 
         See ``Loading.initial_unknowns``.
         """
         return (float(self.sample_table[0, STRESS_FALL_COLUMN]),) if self.of_stress else ()
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the rate of normal stress after the first sample.
 
         See ``Part.parameter_values``.
@@ -214,7 +220,7 @@ class SampledHistory(UserLoading):
     @property
     def sample_table(self) -> np.ndarray:
         """Samples as an array of shape (samples, 4)."""
-        return np.frombuffer(self.samples).reshape(-1, STRESS_RATE_COLUMN + 1)
+        return np.frombuffer(self.sample_table_bytes).reshape(-1, STRESS_RATE_COLUMN + 1)
 
     @cached_property
     def segment_table(self) -> np.ndarray:
@@ -225,7 +231,7 @@ class SampledHistory(UserLoading):
             columns[:, TIME_COLUMN],
             np.append(columns[1:, TIME_COLUMN], math.inf),
             columns[:, VELOCITY_COLUMN],
-            _log_velocity(columns[:, VELOCITY_COLUMN]),
+            _compute_log_velocity_magnitude(columns[:, VELOCITY_COLUMN]),
         )
         if self.of_stress:
             table[:, SEGMENT_LOG_VELOCITY + 1 :] = columns[
@@ -286,7 +292,7 @@ class SampledHistory(UserLoading):
         return replace(self, samples=one.tobytes())
 
 
-def _log_velocity(velocity: np.ndarray) -> np.ndarray:
+def _compute_log_velocity_magnitude(velocity: np.ndarray) -> np.ndarray:
     """Return the logarithm of the magnitude of a velocity."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(abs(velocity)))

@@ -30,7 +30,7 @@ from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.loading.step import StepLoading
 from rsfstudy.slider.needed_quantities import check_needed_quantities
 from rsfstudy.slider.noise.none import NoNoise
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_assembly import SceneParts
 from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.scene_functions import SceneFunctions
@@ -264,17 +264,17 @@ class Scene(SceneFunctions, SceneQuantities):
     __signature__: ClassVar[Signature] = Signature(
         [
             Parameter(n, Parameter.KEYWORD_ONLY, default=d)
-            for n, d in part_registry.scene_field_defaults().items()
+            for n, d in part_registry.collect_scene_field_defaults().items()
         ]
     )
 
-    def _check(self) -> None:
+    def _check_parts_and_compatibility(self) -> None:
         """Check each part, and the compatibility of the parts."""
         check_needed_quantities(self)
         # The law is checked last, because its check may compute steady sliding of the whole scene.
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
-        if self.parts.law.name not in laws.BUILT_IN_PARTS:
+        if self.parts.law.name not in laws.BUILT_IN_LAW_CLASS_BY_NAME:
             check_steady_states(self)
 
     if TYPE_CHECKING:
@@ -380,12 +380,12 @@ class Scene(SceneFunctions, SceneQuantities):
         return {}
 
     @cached_attribute
-    def parameter_values(self) -> Numbers:
+    def parameter_values(self) -> FloatTuple:
         """Parameters of the equations in the order of ``parameter_layout``."""
         return parameter_layout.pack_parameter_values(self)
 
     @cached_attribute
-    def friction_parameter_values(self) -> Numbers:
+    def friction_parameter_values(self) -> FloatTuple:
         """Parameters for functions that depend only on friction.
 
         The elements that describe the spring and the load point are NaN.
@@ -408,14 +408,16 @@ class Scene(SceneFunctions, SceneQuantities):
         at every stiffness, and infinite if steady sliding is unstable at every stiffness.
         """
         slider, law, stress, pores, *_others, heat, _noise = self.parts
-        return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores, heat)
+        return _compute_cached_critical_stiffness(
+            slider.a, slider.mu_star, law, stress, pores, heat
+        )
 
 
-part_registry.RESERVED_NAMES.update(dir(Scene), Scene.__annotations__)
+part_registry.RESERVED_SCENE_ATTRIBUTE_NAMES.update(dir(Scene), Scene.__annotations__)
 
 
 @lru_cache(_CRITICAL_STIFFNESS_CACHE_SIZE)
-def _critical_stiffness(
+def _compute_cached_critical_stiffness(
     a: float,
     mu_star: float,
     law: laws.LawBase,
@@ -431,4 +433,4 @@ def _critical_stiffness(
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
     others = QuasiStatic(), StepLoading(), temperature_part
     scene = Scene(SceneParts(slider, law, normal_stress_part, fluid_part, *others))
-    return stability.critical_stiffness(scene, 0.0, quasi_static=True)
+    return stability.compute_critical_stiffness(scene, 0.0, quasi_static=True)

@@ -14,28 +14,28 @@ from typing import Any, NamedTuple
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import dynamics, fluid, laws, loading, noise, normal_stress, temperature
 from rsfstudy.slider.field_name_hints import (
-    hint_for_unknown_choice,
     hint_for_unknown_field,
+    hint_for_unknown_part_name,
 )
 from rsfstudy.slider.noise.none import NoNoise
 from rsfstudy.slider.part_registry import (
     PART_CLASS_BY_FIELD_NAME,
     PART_SELECTING_FIELDS,
-    SLOT_NAMES,
-    SLOTS,
+    PART_SLOT_NAMES,
+    PART_SLOTS,
     SLOTS_WITH_PART_CHOSEN_BY_NAME,
-    Slot,
+    PartSlot,
     UserPart,
     check_and_register_part,
-    class_of_part,
-    normalise_field_value,
-    scene_field_quantities,
+    collect_scene_field_quantities,
+    get_part_class,
+    replace_part_or_alias_by_part_name,
 )
-from rsfstudy.slider.parts import Part, field_names, validate_field_value
+from rsfstudy.slider.parts import Part, list_part_field_names, validate_field_value
 from rsfstudy.slider.slider_parameters import (
-    ALTERNATIVE_STIFFNESS_FIELDS,
+    ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS,
     SliderParameters,
-    with_stiffness_default,
+    add_default_stiffness_ratio,
 )
 from rsfstudy.slider.temperature.isothermal import Isothermal
 from rsfstudy.slider.user_loadings import UserLoading
@@ -74,7 +74,7 @@ class SceneParts(NamedTuple):
     loading_noise: noise.Noise = NoNoise()
 
 
-def build_parts(field_values: Mapping[str, Any]) -> SceneParts:
+def build_scene_parts(field_values: Mapping[str, Any]) -> SceneParts:
     """Build the parts of a scene from its fields.
 
     Parameters
@@ -92,14 +92,14 @@ def build_parts(field_values: Mapping[str, Any]) -> SceneParts:
     InvalidValue
         If a name is not a field, or if a value violates its rule or does not apply in this scene.
     """
-    chosen = tuple(_select_part(slot, field_values) for slot in SLOTS)
-    layout = build_field_index(tuple(map(class_of_part, chosen)))
+    chosen = tuple(_select_part_for_slot(slot, field_values) for slot in PART_SLOTS)
+    layout = build_field_index(tuple(map(get_part_class, chosen)))
     values = _group_values_by_part_index(field_values, layout)
     made: list[Any] = [
         part(**values.get(place, {})) if isinstance(part, type) else part
         for place, part in enumerate(chosen, start=1)
     ]
-    return SceneParts(SliderParameters(**with_stiffness_default(values.get(0, {}))), *made)
+    return SceneParts(SliderParameters(**add_default_stiffness_ratio(values.get(0, {}))), *made)
 
 
 def replace_field_values(
@@ -128,10 +128,10 @@ def replace_field_values(
     for place, values in _group_values_by_part_index(
         changed_field_values, build_field_index(tuple(map(type, scene_parts[1:])))
     ).items():
-        if any(name in values for name in ALTERNATIVE_STIFFNESS_FIELDS):
+        if any(name in values for name in ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS):
             values = {
-                **dict.fromkeys(ALTERNATIVE_STIFFNESS_FIELDS),
-                **with_stiffness_default(values),
+                **dict.fromkeys(ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS),
+                **add_default_stiffness_ratio(values),
             }
         made[place] = replace(made[place], **values)
     return SceneParts._make(made)
@@ -148,7 +148,7 @@ def _group_values_by_part_index(
     kinds, places, idle = (
         field_index.part_classes,
         field_index.part_index_by_field,
-        field_index.values_of_inactive_fields,
+        field_index.value_by_inactive_field,
     )
     for name, value in field_values.items():
         place = places.get(name)
@@ -162,12 +162,12 @@ def _group_values_by_part_index(
             owner = PART_CLASS_BY_FIELD_NAME[name]
             if name != owner.selected_by or validate_field_value(owner, name, value):
                 raise field_index.rejecting_part_class_by_field[name].rejection_error(name, value)
-        elif name not in SLOT_NAMES:
-            raise _unknown_field_error(name, value, field_index)
+        elif name not in PART_SLOT_NAMES:
+            raise _build_unknown_field_error(name, value, field_index)
     return values
 
 
-def _select_part(slot: Slot, field_values: Mapping[str, Any]) -> UserPart:
+def _select_part_for_slot(slot: PartSlot, field_values: Mapping[str, Any]) -> UserPart:
     """Return the part that the fields select for a slot."""
     value = field_values.get(slot.name)
     if isinstance(value, type | UserLoading):
@@ -175,10 +175,12 @@ def _select_part(slot: Slot, field_values: Mapping[str, Any]) -> UserPart:
     if isinstance(value, str) and value in slot.user_parts and value not in slot.built_in_parts:
         return slot.user_parts[value]
     if not slot.part_class_by_selecting_field:
-        name = normalise_field_value(slot.name, field_values.get(slot.name, slot.default_part_name))
+        name = replace_part_or_alias_by_part_name(
+            slot.name, field_values.get(slot.name, slot.default_part_name)
+        )
         if not isinstance(name, str) or name not in slot.built_in_parts:
             choices = (*slot.built_in_parts, *slot.user_parts)
-            remedy = hint_for_unknown_choice(slot.name, name, choices)
+            remedy = hint_for_unknown_part_name(slot.name, name, choices)
             raise InvalidValue(slot.name, name, "is unknown", choices=choices, remedy=remedy)
         return slot.built_in_parts[name]
     if value is not None:
@@ -220,11 +222,11 @@ class FieldIndex(NamedTuple):
     part_classes: tuple[type[Part], ...]
     part_index_by_field: Mapping[str, int]
     rejecting_part_class_by_field: Mapping[str, type[Part]]
-    values_of_inactive_fields: Mapping[str, Any]
-    inapplicable_fields: frozenset[str]
+    value_by_inactive_field: Mapping[str, Any]
+    inapplicable_field_names: frozenset[str]
     names_of_slots_chosen_by_name: tuple[str, ...]
     all_field_names: tuple[str, ...]
-    fields_not_selecting_a_part: frozenset[str]
+    names_of_fields_not_selecting_a_part: frozenset[str]
 
 
 @cache
@@ -247,10 +249,12 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
         If two parts have a field with the same name.
     """
     kinds: tuple[type[Part], ...] = (SliderParameters, *part_classes)
-    filled = list(zip(SLOTS, part_classes, strict=True))
+    filled = list(zip(PART_SLOTS, part_classes, strict=True))
     owned = {slot.name: part for slot, part in filled if part not in slot.built_in_parts.values()}
-    places = {name: place for place, part in enumerate(kinds) for name in field_names(part)}
-    if len(places) < sum(len(field_names(part)) for part in kinds):
+    places = {
+        name: place for place, part in enumerate(kinds) for name in list_part_field_names(part)
+    }
+    if len(places) < sum(len(list_part_field_names(part)) for part in kinds):
         names = ", ".join(part.name for part in owned.values())
         raise InvalidValue(
             "parts", names, "have fields with the same name", remedy="Rename one of the fields."
@@ -260,17 +264,19 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
     foreign: set[str] = set()
     for slot, part in filled:
         for other in slot.built_in_parts.values():
-            for name in set(field_names(other)) - set(places):
+            for name in set(list_part_field_names(other)) - set(places):
                 refusing[name] = part
                 calls = name == other.selected_by
                 idle[name] = other.__dataclass_fields__[name].default if calls else None
                 if not calls or slot.name in owned:
                     foreign.add(name)
     named = tuple(
-        slot.name for slot in SLOTS if slot in SLOTS_WITH_PART_CHOSEN_BY_NAME or slot.name in owned
+        slot.name
+        for slot in PART_SLOTS
+        if slot in SLOTS_WITH_PART_CHOSEN_BY_NAME or slot.name in owned
     )
-    fields = tuple(scene_field_quantities(owned.values()))
-    plain = frozenset(fields) - {*SLOT_NAMES, *PART_SELECTING_FIELDS}
+    fields = tuple(collect_scene_field_quantities(owned.values()))
+    plain = frozenset(fields) - {*PART_SLOT_NAMES, *PART_SELECTING_FIELDS}
     return FieldIndex(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
 
 
@@ -294,12 +300,14 @@ def find_inapplicable_fields(
     """
     try:
         layout = build_field_index(
-            tuple(class_of_part(_select_part(slot, field_values)) for slot in SLOTS)
+            tuple(get_part_class(_select_part_for_slot(slot, field_values)) for slot in PART_SLOTS)
         )
     except InvalidValue:
         return frozenset()
-    of_others = {name for part in user_parts for name in field_names(class_of_part(part))}
-    return layout.inapplicable_fields | (of_others - set(layout.part_index_by_field))
+    of_others = {
+        name for part in user_parts for name in list_part_field_names(get_part_class(part))
+    }
+    return layout.inapplicable_field_names | (of_others - set(layout.part_index_by_field))
 
 
 def find_user_parts(scene_parts: SceneParts) -> dict[str, UserPart]:
@@ -316,7 +324,7 @@ def find_user_parts(scene_parts: SceneParts) -> dict[str, UserPart]:
         User-defined parts by slot. Protocols and sampled histories are included as objects, and
         other parts as classes.
     """
-    filled = zip(SLOTS, scene_parts[1:], strict=True)
+    filled = zip(PART_SLOTS, scene_parts[1:], strict=True)
     return {
         slot.name: part if isinstance(part, UserLoading) else type(part)
         for slot, part in filled
@@ -324,11 +332,11 @@ def find_user_parts(scene_parts: SceneParts) -> dict[str, UserPart]:
     }
 
 
-def _unknown_field_error(name: str, value: Any, field_index: FieldIndex) -> InvalidValue:
+def _build_unknown_field_error(name: str, value: Any, field_index: FieldIndex) -> InvalidValue:
     """Return the error for an unknown field name."""
-    for slot, part in zip(SLOTS, field_index.part_classes[1:], strict=True):
-        known = map(class_of_part, slot.user_parts.values())
-        owner = next((other for other in known if name in field_names(other)), None)
+    for slot, part in zip(PART_SLOTS, field_index.part_classes[1:], strict=True):
+        known = map(get_part_class, slot.user_parts.values())
+        owner = next((other for other in known if name in list_part_field_names(other)), None)
         if owner is not None:
             rule = f"does not apply to {slot.name}={part.name!r}"
             remedy = f"Omit {name}, or set {slot.name}={owner.name!r}."

@@ -11,24 +11,24 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.slider.field_name_hints import hint_for_positional_argument
 from rsfstudy.slider.part_registry import (
-    OMITTED_DEFAULTS,
-    SLOT_NAMES,
+    DEFAULTS_OMITTED_FROM_STORED_SCENES,
+    PART_SLOT_NAMES,
     SLOTS_WITH_PART_CHOSEN_BY_NAME,
     UserPart,
     add_scene_fields_to_signature,
-    quantities_with_values,
+    iterate_quantities_with_values,
 )
 from rsfstudy.slider.scene_assembly import (
     FieldIndex,
     SceneParts,
     build_field_index,
-    build_parts,
+    build_scene_parts,
     find_inapplicable_fields,
     find_user_parts,
     replace_field_values,
 )
 from rsfstudy.slider.scene_caching import cached_attribute
-from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS
+from rsfstudy.slider.slider_parameters import ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS
 
 #: Names of internal scene attributes, which ``dir`` does not list.
 _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
@@ -64,13 +64,13 @@ class SceneBase(HtmlTableMixin):
     def __init__(self, parts: SceneParts | None = None, /, **given: Any) -> None:
         """Build and check the parts of the scene."""
         if parts is None:
-            parts = build_parts(given)
+            parts = build_scene_parts(given)
         elif not isinstance(parts, SceneParts):
-            raise value_without_field_name_error(parts)
+            raise build_positional_argument_error(parts)
         object.__setattr__(self, "parts", parts)
-        self._check()
+        self._check_parts_and_compatibility()
 
-    def _check(self) -> None:
+    def _check_parts_and_compatibility(self) -> None:
         """Raise ``InvalidValue`` if the parts are incompatible."""
 
     def __getattr__(self, name: str) -> Any:
@@ -82,8 +82,8 @@ class SceneBase(HtmlTableMixin):
             return getattr(self.parts[layout.part_index_by_field[name]], name)
         if name in layout.names_of_slots_chosen_by_name:
             return getattr(self.parts, name).name
-        if name in layout.values_of_inactive_fields:
-            return layout.values_of_inactive_fields[name]
+        if name in layout.value_by_inactive_field:
+            return layout.value_by_inactive_field[name]
         if (new := translate_former_member_name(SceneBase, name)) == name:
             raise AttributeError(f"a {SceneBase.__name__} has no field or attribute {name!r}")
         return getattr(self, new)
@@ -119,7 +119,7 @@ class SceneBase(HtmlTableMixin):
         dict of str to object
             Values by field name.
         """
-        values = dict(self.field_index.values_of_inactive_fields)
+        values = dict(self.field_index.value_by_inactive_field)
         for name in self.field_index.names_of_slots_chosen_by_name:
             values[name] = getattr(self.parts, name).name
         for part in self.parts:
@@ -127,8 +127,9 @@ class SceneBase(HtmlTableMixin):
         return {
             name: values[name]
             for name in self.field_index.all_field_names
-            if name not in OMITTED_DEFAULTS
-            or values[name] != (OMITTED_DEFAULTS[name] if name in SLOT_NAMES else None)
+            if name not in DEFAULTS_OMITTED_FROM_STORED_SCENES
+            or values[name]
+            != (DEFAULTS_OMITTED_FROM_STORED_SCENES[name] if name in PART_SLOT_NAMES else None)
         }
 
     def stored_fields(self) -> dict[str, Any]:
@@ -142,7 +143,7 @@ class SceneBase(HtmlTableMixin):
             versions therefore remain valid.
         """
         values = self.as_dict()
-        for name, default in OMITTED_DEFAULTS.items():
+        for name, default in DEFAULTS_OMITTED_FROM_STORED_SCENES.items():
             if name in values and values[name] == default:
                 del values[name]
         return values
@@ -178,7 +179,7 @@ class SceneBase(HtmlTableMixin):
         iterator of (Quantity, object)
             Pairs of the quantity that describes a field and the value of the field.
         """
-        return quantities_with_values(self.as_dict(), self.user_parts)
+        return iterate_quantities_with_values(self.as_dict(), self.user_parts)
 
     @add_scene_fields_to_signature()
     def with_(self, **changes: Any) -> Self:
@@ -204,19 +205,19 @@ class SceneBase(HtmlTableMixin):
             If a value is invalid in the new scene.
         """
         if all(
-            n in self.field_index.fields_not_selecting_a_part and value is not None
+            n in self.field_index.names_of_fields_not_selecting_a_part and value is not None
             for n, value in changes.items()
         ):
             return type(self)(replace_field_values(self.parts, changes))
         theirs = find_user_parts(self.parts)
         kept = {**self.as_dict(), **theirs}
         dropped = find_inapplicable_fields({**kept, **changes}, theirs.values())
-        if any(changes.get(name) is not None for name in ALTERNATIVE_STIFFNESS_FIELDS):
-            dropped |= {*ALTERNATIVE_STIFFNESS_FIELDS}
+        if any(changes.get(name) is not None for name in ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS):
+            dropped |= {*ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS}
         return type(self)(**{name: kept[name] for name in kept if name not in dropped} | changes)
 
 
-def value_without_field_name_error(value: Any) -> InvalidValue:
+def build_positional_argument_error(value: Any) -> InvalidValue:
     """Return the error for a positional argument of ``Scene``.
 
     Parameters

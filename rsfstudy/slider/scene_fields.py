@@ -23,23 +23,25 @@ class SceneFields:
     QUANTITIES = part_registry.SCENE_FIELD_QUANTITIES
     TYPES = part_registry.SCENE_FIELD_TYPES
     #: Fields whose values are parts, and fields that determine which part is used.
-    SLOT_NAMES = part_registry.SLOT_NAMES
-    SELECTING_A_PART = part_registry.PART_SELECTING_FIELDS
+    PART_SLOT_NAMES = part_registry.PART_SLOT_NAMES
+    NAMES_SELECTING_A_PART = part_registry.PART_SELECTING_FIELDS
     #: Slots of a scene, and the available parts for each slot.
-    SLOTS = part_registry.SLOTS
+    PART_SLOTS = part_registry.PART_SLOTS
     #: Values that are omitted from stored scenes.
-    OMITTED_DEFAULTS = part_registry.OMITTED_DEFAULTS
+    DEFAULTS_OMITTED_FROM_STORED_SCENES = part_registry.DEFAULTS_OMITTED_FROM_STORED_SCENES
     #: Alternative fields for the stiffness. A scene has at most one of these fields.
-    ALTERNATIVE_STIFFNESS = slider_parameters.ALTERNATIVE_STIFFNESS_FIELDS
+    ALTERNATIVE_NAMES_FOR_STIFFNESS = slider_parameters.ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS
 
-    names_of_part = staticmethod(parts.field_names)
-    types_with_user_parts = staticmethod(part_registry.scene_field_types)
-    defaults = staticmethod(part_registry.scene_field_defaults)
-    quantities_with_user_parts = staticmethod(part_registry.scene_field_quantities)
-    quantities_with_values = staticmethod(part_registry.quantities_with_values)
+    list_names_of_part = staticmethod(parts.list_part_field_names)
+    collect_types_with_user_parts = staticmethod(part_registry.collect_scene_field_types)
+    collect_defaults = staticmethod(part_registry.collect_scene_field_defaults)
+    collect_quantities_with_user_parts = staticmethod(part_registry.collect_scene_field_quantities)
+    iterate_quantities_with_values = staticmethod(part_registry.iterate_quantities_with_values)
     add_to_signature = staticmethod(part_registry.add_scene_fields_to_signature)
-    normalise_value = staticmethod(part_registry.normalise_field_value)
-    find_inapplicable = staticmethod(scene_assembly.find_inapplicable_fields)
-    hint_for_unknown = staticmethod(field_name_hints.hint_for_unknown_field)
+    replace_part_or_alias_by_part_name = staticmethod(
+        part_registry.replace_part_or_alias_by_part_name
+    )
+    find_inapplicable_fields = staticmethod(scene_assembly.find_inapplicable_fields)
+    hint_for_unknown_field = staticmethod(field_name_hints.hint_for_unknown_field)
     register_user_parts = staticmethod(part_registry.register_user_parts)
     replace_names_by_user_parts = staticmethod(part_registry.replace_names_by_user_parts)

@@ -25,34 +25,34 @@ class SceneFunctions:
     #: Name of the regime of ruptures with inertia.
     RUPTURE_REGIME = equations.RUPTURE_REGIME
     #: Lower limit of ln(V/V_*). A motion without loading ends at this slip rate.
-    STOPPED_LOG_SLIP_RATE = path_length.STOPPED_LOG_SLIP_RATE
+    LOG_SLIP_RATE_OF_STOPPED_SLIP = path_length.LOG_SLIP_RATE_OF_STOPPED_SLIP
     #: Largest ln(V/V_*) whose exponential is computed.
-    LARGEST_LOG_SLIP_RATE = parameter_layout.LARGEST_LOG_SLIP_RATE
+    LOG_SLIP_RATE_UPPER_LIMIT = parameter_layout.LOG_SLIP_RATE_UPPER_LIMIT
 
-    equations_between_ruptures = equations.equations_between_ruptures
-    equations_in_rupture = equations.equations_in_rupture
-    equations_without_mass = equations.equations_without_mass
-    equations_at_imposed_slip_rate = equations.equations_at_imposed_slip_rate
+    equations_between_ruptures = equations.build_equations_between_ruptures
+    equations_in_rupture = equations.build_equations_in_rupture
+    equations_without_mass = equations.build_equations_without_mass
+    equations_at_imposed_slip_rate = equations.build_equations_at_imposed_slip_rate
     equations_against_displacement = equations.build_equations_against_displacement
     equations_against_inertial_time = equations.build_equations_against_inertial_time
-    slow_manifold_point = equations.slow_manifold_point
-    quasi_static_log_slip_rate = equations.quasi_static_log_slip_rate
+    slow_manifold_point = equations.compute_slow_manifold_point
+    quasi_static_log_slip_rate = equations.compute_quasi_static_log_slip_rate
 
     friction_relation = friction.build_friction_relation
     state_evolution_function = friction.build_state_evolution_function
     compute_steady_states = friction.compute_steady_states
-    effective_normal_stress_at = friction.effective_normal_stress_at
+    effective_normal_stress_at = friction.compute_effective_normal_stress
 
-    steady_sliding = steady_state.steady_sliding
-    steady_friction_minus_reference = steady_state.steady_friction_minus_reference
-    frictional_stress_after_jump = steady_state.frictional_stress_after_jump
-    frictional_stress_for_friction = steady_state.frictional_stress_for_friction
-    min_steady_log_slip_rate = steady_state.min_steady_log_slip_rate
+    steady_sliding = steady_state.compute_steady_sliding
+    steady_friction_minus_reference = steady_state.compute_steady_friction_minus_reference
+    frictional_stress_after_jump = steady_state.compute_frictional_stress_after_jump
+    frictional_stress_from_friction = steady_state.compute_frictional_stress_from_friction
+    min_steady_log_slip_rate = steady_state.find_min_steady_log_slip_rate
 
-    critical_stiffness_at = stability.critical_stiffness
-    all_critical_stiffnesses = stability.all_critical_stiffnesses
-    linear_growth_rates = stability.linear_growth_rates
-    largest_linear_growth_rate = stability.largest_linear_growth_rate
+    critical_stiffness_at = stability.compute_critical_stiffness
+    all_critical_stiffnesses = stability.compute_all_critical_stiffnesses
+    linear_growth_rates = stability.compute_linear_growth_rates
+    largest_linear_growth_rate = stability.compute_largest_linear_growth_rate
 
     def __dir__(self) -> list[str]:
         """Return the public attributes, except for the methods of this class."""

@@ -103,10 +103,10 @@ class SliderParameters(Part):
 
 
 #: Names of the two alternative fields for the stiffness.
-ALTERNATIVE_STIFFNESS_FIELDS = ("stiffness_ratio", "stiffness")
+ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS = ("stiffness_ratio", "stiffness")
 
 
-def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
+def add_default_stiffness_ratio(field_values: dict[str, Any]) -> dict[str, Any]:
     """Return slider parameters with exactly one field for the stiffness.
 
     Parameters
@@ -124,7 +124,7 @@ def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
     InvalidValue
         If both the stiffness and the stiffness ratio are given.
     """
-    given = [name for name in ALTERNATIVE_STIFFNESS_FIELDS if name in field_values]
+    given = [name for name in ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS if name in field_values]
     if len(given) == 2:
         rule = f"cannot be combined with stiffness_ratio = {field_values['stiffness_ratio']:g}"
         raise InvalidValue(

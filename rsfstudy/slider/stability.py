@@ -24,31 +24,31 @@ from rsfstudy.slider.evolution_derivatives import compute_state_evolution_deriva
 from rsfstudy.slider.linear_response import LinearisedForceBalance, linearise_force_balance
 from rsfstudy.slider.polynomials import (
     add_polynomials,
+    compute_dot_product,
     compute_resolvent_polynomials,
-    dot_product,
     evaluate_polynomial,
+    find_positive_real_roots,
     find_roots_with_one_distant_root,
     multiply_polynomials,
-    positive_real_roots,
     split_even_and_odd_powers,
 )
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
+from rsfstudy.slider.steady_state import SteadySliding, compute_steady_sliding
 
 #: Results below these limits cannot be distinguished from zero, because they are as small as
 #: rounding errors. The first number is the limit for the critical stiffness divided by a. The
 #: second number is the limit for the growth rate per unit slip in D_c.
 _MIN_CRITICAL_STIFFNESS_OVER_A, _GROWTH_RATE_FLOOR = 1e-12, 1e-9
 #: Rounding error of all growth rates, as a fraction of the largest growth rate.
-_RELATIVE_ROOT_ROUNDING_ERROR = 64.0 * 2.0**-52
+_RELATIVE_GROWTH_RATE_ROUNDING_ERROR = 64.0 * 2.0**-52
 
 #: If the ratio of the two leading coefficients of the polynomial is below this limit, the mass of
 #: the slider is treated as small.
-_SMALL_MASS_RATIO = 1e-6
+_SMALL_MASS_COEFFICIENT_RATIO = 1e-6
 
 
-def critical_stiffness(
+def compute_critical_stiffness(
     scene: SceneView, log_slip_rate: float, *, quasi_static: bool = False
 ) -> float:
     r"""Compute the critical stiffness of steady sliding at a slip rate.
@@ -84,7 +84,7 @@ def critical_stiffness(
     Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694.
     """
     scene = scene.under_steady_loading
-    steady = steady_sliding(scene, log_slip_rate)
+    steady = compute_steady_sliding(scene, log_slip_rate)
     if steady is None:
         return math.nan
     around = linearise_force_balance(scene, steady, quasi_static=quasi_static)
@@ -97,7 +97,7 @@ def critical_stiffness(
     return math.inf if _is_unstable_at_stiffness(around, 2.0 * critical or scene.a) else critical
 
 
-def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
+def compute_all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
     r"""Compute all critical stiffnesses of steady sliding at a slip rate.
 
     At a critical stiffness, a small perturbation of steady sliding neither grows nor decays. A
@@ -123,7 +123,7 @@ def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[flo
     :math:`K (1 + w^2 p^2) + \eta V p + G(p) = 0` has an imaginary root.
     """
     scene = scene.under_steady_loading
-    steady = steady_sliding(scene, log_slip_rate)
+    steady = compute_steady_sliding(scene, log_slip_rate)
     return (
         []
         if steady is None
@@ -156,7 +156,7 @@ def _find_critical_stiffnesses(
         multiply_polynomials(a_odd, b_even), [-x for x in multiply_polynomials(a_even, b_odd)]
     )
     crossings = []
-    for squared in positive_real_roots(
+    for squared in find_positive_real_roots(
         add_polynomials(resists, [linearised_balance.radiation_damping * x for x in size])
     ):
         elastic = squared * evaluate_polynomial(turns, squared) / evaluate_polynomial(size, squared)
@@ -179,7 +179,7 @@ def _compute_growth_rates(
         [0.0, *linearised_balance.friction_response_numerator],
     )
     light = (
-        0.0 < abs(polynomial[-1]) < _SMALL_MASS_RATIO * abs(polynomial[-2])
+        0.0 < abs(polynomial[-1]) < _SMALL_MASS_COEFFICIENT_RATIO * abs(polynomial[-2])
         and linearised_balance.slip_rate_norm > 0.0
     )
     roots = find_roots_with_one_distant_root(polynomial) if light else np.roots(polynomial[::-1])
@@ -190,7 +190,7 @@ def _is_unstable_at_stiffness(linearised_balance: LinearisedForceBalance, stiffn
     return bool(_compute_growth_rates(linearised_balance, stiffness)[0].real > _GROWTH_RATE_FLOOR)
 
 
-def linear_growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
+def compute_linear_growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
     r"""Compute the growth rates of small perturbations of steady sliding.
 
     Parameters
@@ -217,12 +217,12 @@ def linear_growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
     """
     scene = scene.under_steady_loading
     return _compute_growth_rates(
-        linearise_force_balance(scene, _require_steady_sliding(scene, log_slip_rate)),
+        linearise_force_balance(scene, _compute_steady_sliding_or_raise(scene, log_slip_rate)),
         scene.stiffness,
     )
 
 
-class GrowthRate(NamedTuple):
+class GrowthRateWithError(NamedTuple):
     """Largest growth rate of small perturbations of steady sliding.
 
     Parameters
@@ -233,22 +233,24 @@ class GrowthRate(NamedTuple):
         Error estimate of the real part.
     """
 
-    value: float
-    error: float
+    real_part: float
+    error_estimate: float
 
     @property
     def is_positive(self) -> bool:
         """True if the growth rate exceeds its error estimate."""
-        return self.value > self.error
+        return self.real_part > self.error_estimate
 
     @property
     def is_zero_within_error(self) -> bool:
         """True if the growth rate is zero within its error estimate."""
-        return abs(self.value) <= self.error
+        return abs(self.real_part) <= self.error_estimate
 
 
 @cached_per_scene
-def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> GrowthRate | None:
+def compute_largest_linear_growth_rate(
+    scene: SceneView, log_slip_rate: float
+) -> GrowthRateWithError | None:
     r"""Compute the largest growth rate of perturbations of steady sliding.
 
     Parameters
@@ -266,7 +268,7 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
         rate, the function returns None.
     """
     scene = scene.under_steady_loading
-    steady = steady_sliding(scene, log_slip_rate)
+    steady = compute_steady_sliding(scene, log_slip_rate)
     if steady is None:
         return None
     slopes = compute_state_evolution_derivatives(scene, steady)
@@ -285,11 +287,13 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
     # A small mass makes one root very large. The rounding error excludes the large root, because
     # the large root is computed separately.
     sizes = np.sort(np.abs(found))[: -1 if scene.has_mass else None]
-    rounding = _RELATIVE_ROOT_ROUNDING_ERROR * float(sizes.max(initial=0.0))
-    return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _GROWTH_RATE_FLOOR)
+    rounding = _RELATIVE_GROWTH_RATE_ROUNDING_ERROR * float(sizes.max(initial=0.0))
+    return GrowthRateWithError(
+        float(found[0].real), float(max(changes)) + rounding + _GROWTH_RATE_FLOOR
+    )
 
 
-def spring_response_to_normal_stress(
+def compute_spring_response_to_normal_stress(
     scene: SceneView, log_slip_rate: float, angular_frequency: float
 ) -> complex:
     r"""Compute the response of spring stress to oscillations of normal stress.
@@ -337,7 +341,7 @@ def spring_response_to_normal_stress(
         name = scene.parts.temperature.name
         raise InvalidValue("temperature", name, "has no linear response", remedy=remedy)
     still = scene.under_steady_loading
-    steady = _require_steady_sliding(still, log_slip_rate)
+    steady = _compute_steady_sliding_or_raise(still, log_slip_rate)
     psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = (
         scene.friction_functions.pressure_derivatives,
@@ -348,7 +352,7 @@ def spring_response_to_normal_stress(
     denominator, adjugate = compute_resolvent_polynomials(by_state)
     forced = [gained * x for x in denominator]
     for power, matrix in enumerate(adjugate):
-        forced[power] -= shifted * math.fsum(dot_product(row, by_shift) for row in matrix)
+        forced[power] -= shifted * math.fsum(compute_dot_product(row, by_shift) for row in matrix)
     around, stiffness = linearise_force_balance(still, steady), scene.stiffness
     spring_stress = [stiffness, around.radiation_damping, stiffness * around.slip_rate_norm**2]
     at = 1j * angular_frequency * math.exp(-log_slip_rate)
@@ -364,9 +368,9 @@ def spring_response_to_normal_stress(
     return stiffness * left / (balance * below + at * above)
 
 
-def _require_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding:
+def _compute_steady_sliding_or_raise(scene: SceneView, log_slip_rate: float) -> SteadySliding:
     """Return steady sliding, or raise ``ValueError`` if it does not exist."""
-    steady = steady_sliding(scene, log_slip_rate)
+    steady = compute_steady_sliding(scene, log_slip_rate)
     if steady is None:
         raise ValueError(f"steady sliding does not exist at ln(V/V_*) = {log_slip_rate:g}")
     return steady

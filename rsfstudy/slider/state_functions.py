@@ -16,7 +16,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parameter_layout import A, B
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 from rsfstudy.slider.scene_view import SceneView
 
 if TYPE_CHECKING:
@@ -29,7 +29,9 @@ _CHECKED_LOG_SLIP_RATES, _REST_TOLERANCE = (0.0, -0.5, 0.5), 1e-6
 
 
 @cache
-def wrap_single_state_evolution(single_state_evolution: Function) -> Function:
+def wrap_single_state_evolution_for_tuples(
+    single_state_evolution: NumericFunction,
+) -> NumericFunction:
     r"""Return the function ``evolutions`` of a law with one state.
 
     Parameters
@@ -45,14 +47,16 @@ def wrap_single_state_evolution(single_state_evolution: Function) -> Function:
     """
 
     def evolutions(
-        log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
-    ) -> Numbers:
+        log_slip_rate: float, psis: FloatTuple, shift: float, fraction: float, p: FloatTuple
+    ) -> FloatTuple:
         return (fraction * single_state_evolution(log_slip_rate, psis[0] - shift, p),)
 
     return evolutions
 
 
-def default_steady_state(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
+def compute_default_steady_state(
+    log_slip_rate: float, state_shift: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the default steady state of laws with one state.
 
     Parameters
@@ -72,7 +76,9 @@ def default_steady_state(log_slip_rate: float, state_shift: float, p: Numbers) -
     return (state_shift - p[B] * log_slip_rate,)
 
 
-def find_law_functions(law: LawBase) -> tuple[Function, Function]:
+def find_evolutions_and_steady_states_of_law(
+    law: LawBase,
+) -> tuple[NumericFunction, NumericFunction]:
     """Return the functions ``evolutions`` and ``steady_states`` of a law.
 
     Parameters
@@ -86,12 +92,14 @@ def find_law_functions(law: LawBase) -> tuple[Function, Function]:
         Functions of the tuple of states, as described in ``LawBase``.
     """
     return (
-        law.evolutions or wrap_single_state_evolution(law.evolution),
-        law.steady_states or default_steady_state,
+        law.evolutions or wrap_single_state_evolution_for_tuples(law.evolution),
+        law.steady_states or compute_default_steady_state,
     )
 
 
-def isothermal_state_variable(difference: float, psis: Numbers, p: Numbers) -> float:
+def return_isothermal_state_variable(
+    state_sum_minus_shift: float, psis: FloatTuple, p: FloatTuple
+) -> float:
     r"""Return the state variable at constant temperature.
 
     Parameters
@@ -108,13 +116,13 @@ def isothermal_state_variable(difference: float, psis: Numbers, p: Numbers) -> f
     float
         State variable :math:`\Theta`, which is equal to ``difference``.
     """
-    return difference
+    return state_sum_minus_shift
 
 
 @cache
-def append_auxiliary_evolutions(
-    law_evolutions: Function, auxiliary_rates: Function, law_state_count: int
-) -> Function:
+def combine_law_and_auxiliary_rates(
+    law_state_rates: NumericFunction, auxiliary_rates: NumericFunction, law_state_count: int
+) -> NumericFunction:
     """Return an evolution function for the law states and other unknowns.
 
     Parameters
@@ -133,10 +141,10 @@ def append_auxiliary_evolutions(
     """
 
     def all_evolutions(
-        log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
-    ) -> Numbers:
+        log_slip_rate: float, psis: FloatTuple, shift: float, fraction: float, p: FloatTuple
+    ) -> FloatTuple:
         return (
-            *law_evolutions(log_slip_rate, psis[:law_state_count], shift, fraction, p),
+            *law_state_rates(log_slip_rate, psis[:law_state_count], shift, fraction, p),
             *auxiliary_rates(log_slip_rate, psis[law_state_count:], fraction, p),
         )
 
@@ -144,9 +152,9 @@ def append_auxiliary_evolutions(
 
 
 @cache
-def append_auxiliary_steady_states(
-    law_steady_states: Function, auxiliary_steady_states: Function
-) -> Function:
+def combine_law_and_auxiliary_steady_states(
+    law_steady_states: NumericFunction, auxiliary_steady_states: NumericFunction
+) -> NumericFunction:
     """Return a steady-state function for the law states and other unknowns.
 
     Parameters
@@ -162,7 +170,7 @@ def append_auxiliary_steady_states(
         Function that has the arguments of ``steady_states`` and returns all steady states.
     """
 
-    def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+    def all_steady_states(log_slip_rate: float, shift: float, p: FloatTuple) -> FloatTuple:
         return (
             *law_steady_states(log_slip_rate, shift, p),
             *auxiliary_steady_states(log_slip_rate, p),
@@ -172,7 +180,7 @@ def append_auxiliary_steady_states(
 
 
 @cache
-def build_sum_function(term_count: int) -> Function:
+def build_tuple_sum_function(term_count: int) -> NumericFunction:
     """Return a function that sums the first elements of a tuple.
 
     Parameters
@@ -185,11 +193,13 @@ def build_sum_function(term_count: int) -> Function:
     callable
         Function ``(numbers) -> float``.
     """
-    return _build_function_from_expression("numbers", _tuple_sum_expression("numbers", term_count))
+    return _build_function_from_expression(
+        "numbers", _write_tuple_sum_expression("numbers", term_count)
+    )
 
 
 @cache
-def build_tuple_scaling_function(component_count: int) -> Function:
+def build_tuple_scaling_function(component_count: int) -> NumericFunction:
     """Return a function that scales the first elements of a tuple.
 
     Parameters
@@ -207,7 +217,7 @@ def build_tuple_scaling_function(component_count: int) -> Function:
 
 
 @cache
-def build_state_step_function(state_count: int) -> Function:
+def build_function_adding_step_to_states(state_count: int) -> NumericFunction:
     """Return a function that advances the states by a step.
 
     Parameters
@@ -225,24 +235,26 @@ def build_state_step_function(state_count: int) -> Function:
     return _build_function_from_expression("psis, changes, by", f"({''.join(each)})")
 
 
-def _tuple_sum_expression(tuple_name: str, term_count: int) -> str:
+def _write_tuple_sum_expression(tuple_name: str, term_count: int) -> str:
     """Return the source code of a sum of the first elements of a tuple."""
     return " + ".join(f"{tuple_name}[{i}]" for i in range(term_count))
 
 
-def _build_function_from_expression(argument_names: str, expression: str) -> Function:
+def _build_function_from_expression(argument_names: str, expression: str) -> NumericFunction:
     """Create a function from the source code of its arguments and return value.
 
     The source code contains no loop, because the compiler cannot iterate over tuples.
     """
-    function: Function = eval(f"lambda {argument_names}: {expression}", {"__name__": __name__})
+    function: NumericFunction = eval(
+        f"lambda {argument_names}: {expression}", {"__name__": __name__}
+    )
     return function
 
 
 @cache
 def build_state_contribution_function(
-    law_state_count: int, pressure_derivatives: Function | None
-) -> Function:
+    law_state_count: int, pressure_derivatives: NumericFunction | None
+) -> NumericFunction:
     r"""Return a function for the contribution of the states to the slip rate.
 
     Parameters
@@ -262,18 +274,20 @@ def build_state_contribution_function(
     """
     if pressure_derivatives is None:
         return _build_function_from_expression(
-            "changes, g, psis, p", _tuple_sum_expression("changes", law_state_count)
+            "changes, g, psis, p", _write_tuple_sum_expression("changes", law_state_count)
         )
-    state_sum = build_sum_function(law_state_count)
+    state_sum = build_tuple_sum_function(law_state_count)
 
-    def contribution_with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+    def contribution_with_pressure(
+        changes: FloatTuple, g: float, psis: FloatTuple, p: FloatTuple
+    ) -> float:
         return state_sum(changes) - pressure_derivatives(g, psis, p)[0] * changes[-1]
 
     return contribution_with_pressure
 
 
 @cache
-def build_states_from_strength_function(law_state_count: int) -> Function:
+def build_states_from_strength_function(law_state_count: int) -> NumericFunction:
     """Return a function that computes the first state from the strength.
 
     Parameters
@@ -290,17 +304,17 @@ def build_states_from_strength_function(law_state_count: int) -> Function:
     if law_state_count == 1:
 
         def single_law_state(
-            strength: float, log_slip_rate: float, others: Numbers, p: Numbers
-        ) -> Numbers:
+            strength: float, log_slip_rate: float, others: FloatTuple, p: FloatTuple
+        ) -> FloatTuple:
             return (strength - p[A] * log_slip_rate, *others)
 
         return single_law_state
 
-    sum_of_others = build_sum_function(law_state_count - 1)
+    sum_of_others = build_tuple_sum_function(law_state_count - 1)
 
     def several_law_states(
-        strength: float, log_slip_rate: float, others: Numbers, p: Numbers
-    ) -> Numbers:
+        strength: float, log_slip_rate: float, others: FloatTuple, p: FloatTuple
+    ) -> FloatTuple:
         return (strength - p[A] * log_slip_rate - sum_of_others(others), *others)
 
     return several_law_states
@@ -324,7 +338,7 @@ def check_steady_states(scene: SceneView) -> None:
         If the law violates one of the conditions.
     """
     law, p, still = scene.parts.law, scene.parameter_values, _REST_TOLERANCE * scene.a
-    evolutions, steady_states = find_law_functions(law)
+    evolutions, steady_states = find_evolutions_and_steady_states_of_law(law)
     for rate in _CHECKED_LOG_SLIP_RATES:
         psis = steady_states(rate, 0.0, p)
         change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))
@@ -341,7 +355,9 @@ def check_steady_states(scene: SceneView) -> None:
                 "because friction at V_* is mu_*"
             )
             raise InvalidValue("law", law.name, rule, remedy="Define the states relative to V_*.")
-        away = np.linalg.eigvals(_evolution_jacobian(evolutions, rate, psis, scene.a, p)).real.max()
+        away = np.linalg.eigvals(
+            _compute_evolution_jacobian(evolutions, rate, psis, scene.a, p)
+        ).real.max()
         if away > _REST_TOLERANCE:
             rule = (
                 f"moves away from steady sliding at ln(V/V_*) = {rate:g} with a growth rate of "
@@ -351,12 +367,12 @@ def check_steady_states(scene: SceneView) -> None:
             raise InvalidValue("law", law.name, rule, remedy=remedy)
 
 
-def _evolution_jacobian(
-    evolutions: Function,
+def _compute_evolution_jacobian(
+    evolutions: NumericFunction,
     log_slip_rate: float,
-    states: Numbers,
+    states: FloatTuple,
     finite_difference_scale: float,
-    p: Numbers,
+    p: FloatTuple,
 ) -> list[list[float]]:
     """Compute the Jacobian matrix of the evolution by central differences.
 

@@ -18,15 +18,15 @@ from dataclasses import dataclass
 from scipy.optimize import brentq
 
 from rsfstudy.slider.friction import build_friction_relation, compute_steady_states
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.temperature_functions import thermal_friction_change
+from rsfstudy.slider.temperature_functions import compute_thermal_friction_change
 
 #: Largest deviation of frictional stress, in units of sigma_*, that the root search considers.
-_MAX_STEADY_FRICTIONAL_STRESS = 1e9
+_MAX_FRICTIONAL_STRESS_OF_ROOT_SEARCH = 1e9
 #: Smallest ln(V/V_*) that the search for a minimum steady slip rate considers.
-_MIN_LOG_SLIP_RATE = -1e6
+_MIN_LOG_SLIP_RATE_OF_STEADY_SEARCH = -1e6
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ class SteadySliding:
     log_slip_rate: float
     frictional_stress: float
     spring_stress: float
-    states: Numbers
+    states: FloatTuple
 
 
 @cached_per_scene
-def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | None:
+def compute_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | None:
     r"""Compute steady sliding of a scene at a slip rate.
 
     Parameters
@@ -74,8 +74,10 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     :math:`\mathrm{strength}(g) = a \ln(V/V_*) + \sum_i \Psi_i`. The spring stress is the sum of the
     frictional stress and the stress that radiation damping adds.
     """
-    change = steady_friction_minus_reference(scene, log_slip_rate)
-    friction = None if math.isnan(change) else frictional_stress_for_friction(scene, change)
+    change = compute_steady_friction_minus_reference(scene, log_slip_rate)
+    friction = (
+        None if math.isnan(change) else compute_frictional_stress_from_friction(scene, change)
+    )
     if friction is None:
         return None
     spring_stress = friction + scene.dynamics.radiated_stress(log_slip_rate)
@@ -88,7 +90,7 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     )
 
 
-def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> float:
+def compute_steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> float:
     r"""Compute the steady friction coefficient minus its reference value.
 
     Parameters
@@ -114,10 +116,10 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
     """
     states = compute_steady_states(scene, log_slip_rate, 0.0)
     psi = scene.friction_functions.state_sum(states)
-    return float(scene.a * log_slip_rate + psi + thermal_friction_change(scene, states))
+    return float(scene.a * log_slip_rate + psi + compute_thermal_friction_change(scene, states))
 
 
-def frictional_stress_for_friction(
+def compute_frictional_stress_from_friction(
     scene: SceneView, friction_minus_reference: float
 ) -> float | None:
     r"""Compute the frictional stress from the friction coefficient.
@@ -148,12 +150,12 @@ def frictional_stress_for_friction(
         return value - shift - friction_minus_reference
 
     return _find_root_of_increasing_function(
-        residual, friction_minus_reference, _min_frictional_stress(scene)
+        residual, friction_minus_reference, _find_min_frictional_stress(scene)
     )
 
 
-def frictional_stress_after_jump(
-    scene: SceneView, strength: float, states: Numbers = ()
+def compute_frictional_stress_after_jump(
+    scene: SceneView, strength: float, states: FloatTuple = ()
 ) -> float | None:
     r"""Compute the frictional stress after a sudden change in stress or slip rate.
 
@@ -181,11 +183,13 @@ def frictional_stress_after_jump(
     """
     relation = build_friction_relation(scene, states)
     return _find_root_of_increasing_function(
-        lambda friction: relation(friction)[0] - strength, strength, _min_frictional_stress(scene)
+        lambda friction: relation(friction)[0] - strength,
+        strength,
+        _find_min_frictional_stress(scene),
     )
 
 
-def _min_frictional_stress(scene: SceneView) -> float:
+def _find_min_frictional_stress(scene: SceneView) -> float:
     """Return the frictional stress above which slip is forward.
 
     Normal stress is positive if the frictional stress exceeds the returned stress.
@@ -216,19 +220,19 @@ def _find_root_of_increasing_function(
             else (low - stride)
         )
         stride *= 2.0
-        if stride > _MAX_STEADY_FRICTIONAL_STRESS or low == high:
+        if stride > _MAX_FRICTIONAL_STRESS_OF_ROOT_SEARCH or low == high:
             return None
         at = increasing_function(low)
     if high == low:
         while increasing_function(high) <= 0.0:
-            if high > _MAX_STEADY_FRICTIONAL_STRESS:
+            if high > _MAX_FRICTIONAL_STRESS_OF_ROOT_SEARCH:
                 return None
             low, high = high, high + stride
             stride *= 2.0
     return float(brentq(increasing_function, low, high, xtol=1e-22, rtol=8.9e-16, maxiter=500))
 
 
-def min_steady_log_slip_rate(scene: SceneView) -> float:
+def find_min_steady_log_slip_rate(scene: SceneView) -> float:
     r"""Compute the smallest slip rate at which steady sliding exists.
 
     Parameters
@@ -250,7 +254,7 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
     doi:10.1007/s11589-014-0098-4).
     """
     value, _slope, shift, _shift_slope = build_friction_relation(scene)(
-        _MAX_STEADY_FRICTIONAL_STRESS
+        _MAX_FRICTIONAL_STRESS_OF_ROOT_SEARCH
     )
     strongest = value - shift
     if strongest > 1e6:
@@ -259,13 +263,13 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
         return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
 
     def excess(log_slip_rate: float) -> float:
-        change = steady_friction_minus_reference(scene, log_slip_rate)
+        change = compute_steady_friction_minus_reference(scene, log_slip_rate)
         # If there is no steady temperature, the slip rate is treated as too small.
         return 1.0 if math.isnan(change) else change - strongest
 
     slower = -1.0
     while excess(slower) <= 0.0:
         slower *= 2.0
-        if slower < _MIN_LOG_SLIP_RATE:
+        if slower < _MIN_LOG_SLIP_RATE_OF_STEADY_SEARCH:
             return -math.inf
     return float(brentq(excess, slower, 0.0, xtol=1e-12))

@@ -26,25 +26,28 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Any, NamedTuple
 
-from rsfstudy.slider.friction_relation import zero_normal_stress_excess
-from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A, temperature_parameter_values
-from rsfstudy.slider.parts import Function, Numbers, collect_parameter_values
+from rsfstudy.slider.friction_relation import return_zero_normal_stress_excess
+from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A, pack_temperature_parameter_values
+from rsfstudy.slider.parts import FloatTuple, NumericFunction, collect_parameter_values
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.state_functions import build_sum_function, find_law_functions
+from rsfstudy.slider.state_functions import (
+    build_tuple_sum_function,
+    find_evolutions_and_steady_states_of_law,
+)
 
 #: Number of parameters that precede the parameters that the temperature part declares.
-_COMMON_PARAMETER_COUNT = 3
+_COMMON_TEMPERATURE_PARAMETER_COUNT = 3
 #: Smallest temperature, relative to T_*. Lower temperatures occur only in trial steps of the
 #: integrator.
-_MIN_TEMPERATURE = 1e-3
+_MIN_TEMPERATURE_RATIO = 1e-3
 #: Limits of the effective normal stress, in sigma_*, that is computed from the friction
 #: coefficient. The limits are exceeded only in trial steps of the integrator.
 _MIN_NORMAL_STRESS, _MAX_NORMAL_STRESS = 1e-12, 1e12
 #: Number of Newton iterations for the normal stress, if it depends nonlinearly on shear stress.
-_NORMAL_STRESS_ITERATION_COUNT = 30
+_NORMAL_STRESS_NEWTON_ITERATION_COUNT = 30
 #: Largest change in ln V between two points along the branch of steady sliding.
-_MAX_LOG_SLIP_RATE_CHANGE = 0.25
+_MAX_LOG_SLIP_RATE_CONTINUATION_STEP = 0.25
 #: Value of ln(V/V_*) below which slip does not heat the fault, to double precision.
 _MIN_HEATING_LOG_SLIP_RATE = -60.0
 #: Maximum number of secant iterations in the search for a steady temperature, relative tolerance of
@@ -53,19 +56,21 @@ _MIN_HEATING_LOG_SLIP_RATE = -60.0
 _MAX_SECANT_COUNT, _ROOT_TOLERANCE, _STAGNATION_TOLERANCE = 30, 1e-14, 1e-10
 
 
-class _Places(NamedTuple):
+class _TemperatureIndices(NamedTuple):
     """Indices of the temperature in the tuples of states and parameters.
 
     The index of the state is negative. The index ``end`` is one greater than the index of the last
     parameter.
     """
 
-    state: int
-    first_parameter: int
-    end: int
+    state_index: int
+    first_parameter_index: int
+    parameter_end_index: int
 
 
-def build_replacements(scene: SceneView, isothermal: Mapping[str, Any]) -> dict[str, Any]:
+def build_temperature_dependent_functions(
+    scene: SceneView, isothermal_functions: Mapping[str, Any]
+) -> dict[str, Any]:
     """Build the friction functions that depend on the temperature of a scene.
 
     Parameters
@@ -82,35 +87,37 @@ def build_replacements(scene: SceneView, isothermal: Mapping[str, Any]) -> dict[
     """
     parts, source, law_states = scene.parts, scene.pressure_source, scene.parts.law.state_count
     first = LAW + len(collect_parameter_values(parts.law, scene))
-    end = first + len(temperature_parameter_values(scene))
-    places = _Places(-1 - len(source.unknowns), first, end)
+    end = first + len(pack_temperature_parameter_values(scene))
+    places = _TemperatureIndices(-1 - len(source.unknowns), first, end)
     stress, oscillates = parts.normal_stress, parts.loading.has_load_point_unknown
     normal_stress = _build_normal_stress_function(
-        stress.normal_stress or zero_normal_stress_excess,
+        stress.normal_stress or return_zero_normal_stress_excess,
         has_pressure=bool(source.unknowns) and not oscillates,
         is_linear=stress.normal_stress is None or stress.coupling is not None,
     )
-    evolutions, steady_states = find_law_functions(parts.law)
+    evolutions, steady_states = find_evolutions_and_steady_states_of_law(parts.law)
     replacements: dict[str, Any] = {
-        "evolutions": _append_temperature_evolution(
+        "evolutions": _combine_law_temperature_and_other_rates(
             evolutions,
             source.auxiliary_rates,
-            _build_warming_function(
+            _build_temperature_rate_function(
                 parts.temperature.temperature_rate, normal_stress, law_states, places
             ),
             law_states,
             first + 2 if parts.fluid.pressurisation_factor else 0,
         ),
-        "steady_states": _insert_steady_temperature(steady_states, source.auxiliary_steady_states),
+        "steady_states": _insert_nan_for_steady_temperature(
+            steady_states, source.auxiliary_steady_states
+        ),
         "indices_of_states_in_distance": tuple(
-            i + (i >= law_states) for i in isothermal["indices_of_states_in_distance"]
+            i + (i >= law_states) for i in isothermal_functions["indices_of_states_in_distance"]
         ),
     }
     if any(parts.temperature.activation):
-        contribution = isothermal["state_contribution"]
+        contribution = isothermal_functions["state_contribution"]
         replacements |= {
-            "strength": _add_temperature_to_strength(isothermal["strength"], places),
-            "state_contribution": _add_temperature_to_contribution(contribution, places),
+            "strength": _add_temperature_to_strength(isothermal_functions["strength"], places),
+            "state_contribution": _add_temperature_to_state_contribution(contribution, places),
             "state_variable": _build_state_variable_function(places),
         }
     return replacements
@@ -119,7 +126,7 @@ def build_replacements(scene: SceneView, isothermal: Mapping[str, Any]) -> dict[
 # ---- effects on friction -------------------------------------------------------------------------
 
 
-def inverse_temperature_change(rise: float) -> float:
+def compute_inverse_temperature_change(temperature_rise: float) -> float:
     r"""Compute the change in the inverse temperature.
 
     Parameters
@@ -132,10 +139,12 @@ def inverse_temperature_change(rise: float) -> float:
     float
         Value of :math:`\Lambda = T_*/T - 1`.
     """
-    return -rise / max(1.0 + rise, _MIN_TEMPERATURE)
+    return -temperature_rise / max(1.0 + temperature_rise, _MIN_TEMPERATURE_RATIO)
 
 
-def temperature_derivatives(rise: float, parameters: Numbers) -> tuple[float, float]:
+def compute_derivatives_by_temperature(
+    temperature_rise: float, temperature_parameters: FloatTuple
+) -> tuple[float, float]:
     r"""Compute the derivatives of strength and shift with respect to temperature.
 
     Parameters
@@ -151,45 +160,61 @@ def temperature_derivatives(rise: float, parameters: Numbers) -> tuple[float, fl
         Derivatives with respect to :math:`\vartheta`, :math:`a q_a/(1 + \vartheta)^2` and
         :math:`b q_b/(1 + \vartheta)^2`.
     """
-    falling = max(1.0 + rise, _MIN_TEMPERATURE) ** -2
-    return parameters[0] * falling, parameters[1] * falling
+    falling = max(1.0 + temperature_rise, _MIN_TEMPERATURE_RATIO) ** -2
+    return temperature_parameters[0] * falling, temperature_parameters[1] * falling
 
 
 @cache
-def _add_temperature_to_strength(strength_function: Function, places: _Places) -> Function:
+def _add_temperature_to_strength(
+    strength_function: NumericFunction, temperature_indices: _TemperatureIndices
+) -> NumericFunction:
     """Return a friction relation that includes both activation terms."""
-    place, first, second = places.state, places.first_parameter, places.first_parameter + 1
+    place, first, second = (
+        temperature_indices.state_index,
+        temperature_indices.first_parameter_index,
+        temperature_indices.first_parameter_index + 1,
+    )
 
-    def thermal_strength(g: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
+    def thermal_strength(
+        g: float, psis: FloatTuple, p: FloatTuple
+    ) -> tuple[float, float, float, float]:
         value, slope, shift, shift_slope = strength_function(g, psis, p)
-        change = inverse_temperature_change(psis[place])
+        change = compute_inverse_temperature_change(psis[place])
         return value - p[first] * change, slope, shift - p[second] * change, shift_slope
 
     return thermal_strength
 
 
 @cache
-def _add_temperature_to_contribution(contribution_function: Function, places: _Places) -> Function:
+def _add_temperature_to_state_contribution(
+    contribution_function: NumericFunction, temperature_indices: _TemperatureIndices
+) -> NumericFunction:
     """Return a function for the friction change due to states and temperature."""
-    place, first, end = places.state, places.first_parameter, places.end
+    place, first, end = (
+        temperature_indices.state_index,
+        temperature_indices.first_parameter_index,
+        temperature_indices.parameter_end_index,
+    )
 
-    def thermal_contribution(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
-        gained = temperature_derivatives(psis[place], p[first:end])[0]
+    def thermal_contribution(
+        changes: FloatTuple, g: float, psis: FloatTuple, p: FloatTuple
+    ) -> float:
+        gained = compute_derivatives_by_temperature(psis[place], p[first:end])[0]
         return contribution_function(changes, g, psis, p) - gained * changes[place]
 
     return thermal_contribution
 
 
 @cache
-def _build_state_variable_function(places: _Places) -> Function:
+def _build_state_variable_function(temperature_indices: _TemperatureIndices) -> NumericFunction:
     r"""Return a function that computes the state variable.
 
     The sum of the states minus the shift is :math:`\Theta + b q_b \Lambda`.
     """
-    place, second = places.state, places.first_parameter + 1
+    place, second = temperature_indices.state_index, temperature_indices.first_parameter_index + 1
 
-    def state_variable(difference: float, psis: Numbers, p: Numbers) -> float:
-        return difference - p[second] * inverse_temperature_change(psis[place])
+    def state_variable(difference: float, psis: FloatTuple, p: FloatTuple) -> float:
+        return difference - p[second] * compute_inverse_temperature_change(psis[place])
 
     return state_variable
 
@@ -199,21 +224,21 @@ def _build_state_variable_function(places: _Places) -> Function:
 
 @cache
 def _build_normal_stress_function(
-    total_normal_stress: Function, *, has_pressure: bool, is_linear: bool
-) -> Function:
+    total_normal_stress_function: NumericFunction, *, has_pressure: bool, is_linear: bool
+) -> NumericFunction:
     r"""Return a function ``(friction, psis, p)`` for the effective normal stress.
 
     The frictional stress :math:`g` solves :math:`\mu_* + g = \mu s(g)`. Newton's method needs a
     single iteration if the normal stress :math:`s` is a linear function of :math:`g`. If
     ``has_pressure`` is True, the last state reduces the normal stress.
     """
-    iterations = 1 if is_linear else _NORMAL_STRESS_ITERATION_COUNT
+    iterations = 1 if is_linear else _NORMAL_STRESS_NEWTON_ITERATION_COUNT
 
-    def normal_stress(friction: float, psis: Numbers, p: Numbers) -> float:
+    def normal_stress(friction: float, psis: FloatTuple, p: FloatTuple) -> float:
         g, pressure = friction - p[MU_STAR], psis[-1] if has_pressure else 0.0
         ratio = 1.0
         for _ in range(iterations):
-            excess, change = total_normal_stress(g, p)
+            excess, change = total_normal_stress_function(g, p)
             ratio = 1.0 + excess - pressure
             resisting = max(1.0 - friction * change, _MIN_NORMAL_STRESS)
             step = (friction * ratio - p[MU_STAR] - g) / resisting
@@ -225,55 +250,69 @@ def _build_normal_stress_function(
 
 
 @cache
-def _build_warming_function(
-    temperature_rate: Function, normal_stress: Function, law_state_count: int, places: _Places
-) -> Function:
+def _build_temperature_rate_function(
+    heating_function: NumericFunction,
+    normal_stress_function: NumericFunction,
+    law_state_count: int,
+    temperature_indices: _TemperatureIndices,
+) -> NumericFunction:
     r"""Return a function ``(x, psis, shift, fraction, p)`` for the temperature rate.
 
     The friction coefficient is
     :math:`\mu = \mu_* + a \ln V + \Psi - \mathrm{shift} - (b q_b - a q_a) \Lambda`.
     """
-    place, first, end = law_state_count, places.first_parameter, places.end
-    own, state_sum = first + _COMMON_PARAMETER_COUNT, build_sum_function(law_state_count)
+    place, first, end = (
+        law_state_count,
+        temperature_indices.first_parameter_index,
+        temperature_indices.parameter_end_index,
+    )
+    own, state_sum = (
+        first + _COMMON_TEMPERATURE_PARAMETER_COUNT,
+        build_tuple_sum_function(law_state_count),
+    )
 
-    def warming(x: float, psis: Numbers, shift: float, fraction: float, p: Numbers) -> float:
+    def warming(x: float, psis: FloatTuple, shift: float, fraction: float, p: FloatTuple) -> float:
         rise, activated = psis[place], p[first + 1] - p[first]
         friction = p[MU_STAR] + p[A] * x + state_sum(psis) - shift
-        friction -= activated * inverse_temperature_change(rise)
-        stress = normal_stress(friction, psis, p)
-        return temperature_rate(x, rise, friction, stress, fraction, p[own:end])
+        friction -= activated * compute_inverse_temperature_change(rise)
+        stress = normal_stress_function(friction, psis, p)
+        return heating_function(x, rise, friction, stress, fraction, p[own:end])
 
     return warming
 
 
 @cache
-def _append_temperature_evolution(
-    law_evolutions: Function,
-    auxiliary_rates: Function | None,
-    warming: Function,
+def _combine_law_temperature_and_other_rates(
+    law_state_rates: NumericFunction,
+    auxiliary_rates: NumericFunction | None,
+    temperature_rate_function: NumericFunction,
     law_state_count: int,
-    pressurisation_index: int,
-) -> Function:
+    pressurisation_parameter_index: int,
+) -> NumericFunction:
     """Return an evolution function for law states, temperature and other unknowns.
 
     The pressurisation index is 0 if heat does not change the pore pressure.
     """
     place, after = law_state_count, law_state_count + 1
 
-    def evolutions(x: float, psis: Numbers, shift: float, fraction: float, p: Numbers) -> Numbers:
-        changes = law_evolutions(x, psis[:place], shift, fraction, p)
-        return (*changes, warming(x, psis, shift, fraction, p))
+    def evolutions(
+        x: float, psis: FloatTuple, shift: float, fraction: float, p: FloatTuple
+    ) -> FloatTuple:
+        changes = law_state_rates(x, psis[:place], shift, fraction, p)
+        return (*changes, temperature_rate_function(x, psis, shift, fraction, p))
 
     if auxiliary_rates is None:
         return evolutions
 
     def evolutions_with_others(
-        x: float, psis: Numbers, shift: float, fraction: float, p: Numbers
-    ) -> Numbers:
-        changes = law_evolutions(x, psis[:place], shift, fraction, p)
-        heated = warming(x, psis, shift, fraction, p)
+        x: float, psis: FloatTuple, shift: float, fraction: float, p: FloatTuple
+    ) -> FloatTuple:
+        changes = law_state_rates(x, psis[:place], shift, fraction, p)
+        heated = temperature_rate_function(x, psis, shift, fraction, p)
         others = auxiliary_rates(x, psis[after:], fraction, p)
-        pressed = p[pressurisation_index] * heated if pressurisation_index else 0.0
+        pressed = (
+            p[pressurisation_parameter_index] * heated if pressurisation_parameter_index else 0.0
+        )
         return (*changes, heated, *others[:-1], others[-1] + pressed)
 
     return evolutions_with_others
@@ -283,9 +322,9 @@ def _append_temperature_evolution(
 
 
 @cache
-def _insert_steady_temperature(
-    law_steady_states: Function, auxiliary_steady_states: Function | None
-) -> Function:
+def _insert_nan_for_steady_temperature(
+    law_steady_states: NumericFunction, auxiliary_steady_states: NumericFunction | None
+) -> NumericFunction:
     """Return a steady-state function that sets the temperature rise to NaN.
 
     The temperature rise is not computed here, because ``steady_temperature_rise`` would have to
@@ -293,13 +332,13 @@ def _insert_steady_temperature(
     temperature rise.
     """
 
-    def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+    def steady_states(log_slip_rate: float, shift: float, p: FloatTuple) -> FloatTuple:
         return (*law_steady_states(log_slip_rate, shift, p), math.nan)
 
     if auxiliary_steady_states is None:
         return steady_states
 
-    def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+    def all_steady_states(log_slip_rate: float, shift: float, p: FloatTuple) -> FloatTuple:
         of_law = law_steady_states(log_slip_rate, shift, p)
         return (*of_law, math.nan, *auxiliary_steady_states(log_slip_rate, p))
 
@@ -307,7 +346,7 @@ def _insert_steady_temperature(
 
 
 @cached_per_scene
-def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
+def compute_steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
     r"""Compute the temperature rise of steady sliding.
 
     Several temperatures may be steady at the same slip rate. The function selects the temperature
@@ -328,16 +367,16 @@ def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
         continuously to the given slip rate.
     """
     functions, p = scene.friction_functions, scene.friction_parameter_values
-    place, activated = scene.parts.law.state_count, temperature_parameter_values(scene)[1]
+    place, activated = scene.parts.law.state_count, pack_temperature_parameter_values(scene)[1]
 
     def warming(x: float, rise: float) -> float:
-        shift = -activated * inverse_temperature_change(rise)
+        shift = -activated * compute_inverse_temperature_change(rise)
         steady = functions.steady_states(x, shift, p)
         psis = (*steady[:place], rise, *steady[place + 1 :])
         return float(functions.evolutions(x, psis, shift, math.exp(min(x, 0.0)), p)[place])
 
     log_slip_rate = max(log_slip_rate, _MIN_HEATING_LOG_SLIP_RATE)
-    count = max(1, math.ceil(abs(log_slip_rate) / _MAX_LOG_SLIP_RATE_CHANGE))
+    count = max(1, math.ceil(abs(log_slip_rate) / _MAX_LOG_SLIP_RATE_CONTINUATION_STEP))
     # Without activation terms, only differences of temperature matter.
     coldest = -1.0 if any(scene.parts.temperature.activation) else -math.inf
     rise, before = 0.0, 0.0
@@ -370,7 +409,7 @@ def _find_root_by_secants(function: Callable[[float], float], guess: float) -> f
     return at if abs(step) <= _STAGNATION_TOLERANCE * (1.0 + abs(at)) else math.nan
 
 
-def thermal_friction_change(scene: SceneView, states: Numbers) -> float:
+def compute_thermal_friction_change(scene: SceneView, states: FloatTuple) -> float:
     r"""Compute the change in steady friction due to the temperature rise.
 
     Parameters
@@ -388,6 +427,6 @@ def thermal_friction_change(scene: SceneView, states: Numbers) -> float:
     """
     if not any(scene.parts.temperature.activation):
         return 0.0
-    direct, evolution = temperature_parameter_values(scene)[:2]
+    direct, evolution = pack_temperature_parameter_values(scene)[:2]
     rise = states[scene.parts.law.state_count]
-    return (direct - evolution) * inverse_temperature_change(rise)
+    return (direct - evolution) * compute_inverse_temperature_change(rise)

@@ -18,7 +18,7 @@ import numpy as np
 
 from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantities import is_variable_name
+from rsfstudy.quantities import is_valid_variable_name
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parameter_layout import SEGMENT_VELOCITY
 from rsfstudy.slider.scene_view import SceneView
@@ -47,13 +47,13 @@ class UserLoading(Loading, ABC):
         """
         back = np.asarray(self.segment_table)[:, SEGMENT_VELOCITY] < 0.0
         if back.any() and not scene.parts.law.regularised:
-            name, value, place = self.locate_load_point_reversal(int(np.argmax(back)))
+            name, value, place = self.describe_load_point_reversal(int(np.argmax(back)))
             rule = "moves the load point backwards, but friction is defined for forward slip only"
             remedy = "Set regularised=True, which permits reversed slip."
             raise InvalidValue(name, value, rule, remedy=remedy).with_location(place)
         super().check(scene)
 
-    def locate_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
+    def describe_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
         """Describe the input value that moves the load point backwards.
 
         Parameters
@@ -165,7 +165,7 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
     >>> scene.load_velocity
     1.0
     """
-    if not is_variable_name(name):
+    if not is_valid_variable_name(name):
         raise InvalidValue(
             "name", name, "must be a Python identifier, because it is the name of the protocol"
         )
@@ -191,7 +191,9 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
     return Protocol(name=name, input_segments=tuple(history))
 
 
-def _parse_segment(declared_segment: Any, previous_normal_stress: float, location: str) -> Segment:
+def _parse_segment(
+    declared_segment: Any, previous_normal_stress: float, segment_position_text: str
+) -> Segment:
     """Convert an input segment to a validated ``Segment``.
 
     The argument ``previous_normal_stress`` is the normal stress of the previous segment, and
@@ -237,13 +239,13 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
             velocity, declared_segment.get("step", 0.0), duration, previous_normal_stress
         )
     except InvalidValue as error:
-        raise error.with_location(location) from error
+        raise error.with_location(segment_position_text) from error
 
 
 def _read_positive_number(declared_segment: Mapping[str, Any], key: str, rule: str) -> float:
     """Return a value from a mapping. The value must be positive and finite."""
     value = declared_segment[key]
-    if not (_is_number(value) and 0.0 < value < math.inf):
+    if not (_is_real_number(value) and 0.0 < value < math.inf):
         raise InvalidValue(key, value, f"must be {rule}")
     return float(value)
 
@@ -252,20 +254,20 @@ def _build_validated_segment(
     velocity: Any, step: Any, duration: Any, normal_stress: Any
 ) -> Segment:
     """Return a ``Segment`` whose values have been validated."""
-    if not _is_number(velocity) or not math.isfinite(velocity):
+    if not _is_real_number(velocity) or not math.isfinite(velocity):
         remedy = "Use 0 to hold the load point."
         raise InvalidValue("velocity", velocity, "must be a finite number", remedy=remedy)
-    if not _is_number(step) or not math.isfinite(step):
+    if not _is_real_number(step) or not math.isfinite(step):
         raise InvalidValue("step", step, "must be a finite number")
-    if not _is_number(duration) or not duration > 0.0:
+    if not _is_real_number(duration) or not duration > 0.0:
         remedy = "Remove segments with zero duration."
         raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
-    if not _is_number(normal_stress) or not -1.0 < normal_stress < math.inf:
+    if not _is_real_number(normal_stress) or not -1.0 < normal_stress < math.inf:
         rule = "must be greater than -1, because it is the imposed normal stress minus sigma_*"
         raise InvalidValue("normal_stress", normal_stress, rule)
     return Segment(float(velocity), float(step), float(duration), float(normal_stress))
 
 
-def _is_number(value: Any) -> bool:
+def _is_real_number(value: Any) -> bool:
     """Return True if a value is a real number but not a boolean."""
     return isinstance(value, Real) and not isinstance(value, bool)

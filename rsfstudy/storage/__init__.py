@@ -14,22 +14,26 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.storage.cell_columns import CellColumns, OutputPacker, StoredCellRow
+    from rsfstudy.storage.cell_columns import CellJournalRow, CellOutputPacker, CellResultArrays
     from rsfstudy.storage.cell_journal import (
         CellJournal,
-        CellTimings,
+        CellWallTimes,
     )
     from rsfstudy.storage.cell_numbers import find_cell_number
-    from rsfstudy.storage.comparison import Comparison, compare_results, compare_same_lattice
+    from rsfstudy.storage.comparison import (
+        ResultsComparison,
+        compare_results,
+        compare_results_of_same_study,
+    )
     from rsfstudy.storage.dataset_files import (
         convert_attributes_for_netcdf,
         read_dataset,
         write_dataset,
     )
-    from rsfstudy.storage.declarations import build_scene_from_stored
+    from rsfstudy.storage.declarations import build_scene_from_stored_fields
     from rsfstudy.storage.fingerprints import find_fingerprint_differences
-    from rsfstudy.storage.lattice_coordinates import LatticeCoordinates
-    from rsfstudy.storage.lattice_datasets import assemble_dataset
+    from rsfstudy.storage.lattice_coordinates import LatticeCoordinatesBuilder
+    from rsfstudy.storage.lattice_datasets import assemble_study_dataset
     from rsfstudy.storage.stored_dataset import StoredDataset
     from rsfstudy.storage.zarr_store import ZarrStore
 else:
@@ -60,18 +64,18 @@ else:
 __all__ = [
     "StoredDataset",
     "ZarrStore",
-    "CellColumns",
-    "StoredCellRow",
-    "CellTimings",
-    "Comparison",
+    "CellResultArrays",
+    "CellJournalRow",
+    "CellWallTimes",
+    "ResultsComparison",
     "CellJournal",
-    "LatticeCoordinates",
-    "OutputPacker",
-    "assemble_dataset",
-    "build_scene_from_stored",
+    "LatticeCoordinatesBuilder",
+    "CellOutputPacker",
+    "assemble_study_dataset",
+    "build_scene_from_stored_fields",
     "convert_attributes_for_netcdf",
     "compare_results",
-    "compare_same_lattice",
+    "compare_results_of_same_study",
     "find_cell_number",
     "find_fingerprint_differences",
     "read_dataset",

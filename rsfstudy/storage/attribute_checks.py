@@ -14,7 +14,7 @@ import xarray as xr
 from rsfstudy.errors import DataError, shorten_text
 
 #: Maximum length of string attributes in characters, by attribute name.
-_MAX_CHARACTERS_OF_TEXT_ATTRIBUTES = {
+_MAX_LENGTH_BY_TEXT_ATTRIBUTE = {
     "long_name": 2000,
     "units": 200,
     "scale": 200,
@@ -41,7 +41,7 @@ def check_variable_attributes(dataset: xr.Dataset) -> None:
         from the number of flag meanings.
     """
     for name, values in dataset.variables.items():
-        for key, most in _MAX_CHARACTERS_OF_TEXT_ATTRIBUTES.items():
+        for key, most in _MAX_LENGTH_BY_TEXT_ATTRIBUTE.items():
             if key in values.attrs:
                 _check_text_attribute(f"{shorten_text(name)}.{key}", values.attrs[key], most)
         _check_flag_values_and_meanings(str(name), values.attrs)

@@ -21,10 +21,10 @@ from rsfstudy.status import Status
 #: Type of a row of the journal table ``cells``. A row contains the key, the name of the status, the
 #: message, the number of right-hand-side evaluations, the wall time in s, the packed outputs and
 #: the checksum.
-StoredCellRow = tuple[bytes, str, str, int, float, bytes, int]
+CellJournalRow = tuple[bytes, str, str, int, float, bytes, int]
 
 
-class OutputPacker:
+class CellOutputPacker:
     """Conversion of the outputs of a measure to a row of float64 numbers.
 
     Parameters
@@ -74,7 +74,9 @@ class OutputPacker:
             row[self.slices[name]] = np.ravel(value)
         return row.tobytes()
 
-    def pack_cell(self, cell_key: bytes, outcome: Outcome, wall_time: float) -> StoredCellRow:
+    def pack_journal_row(
+        self, cell_key: bytes, outcome: Outcome, wall_time: float
+    ) -> CellJournalRow:
         """Pack the outcome of a cell as a row of the journal.
 
         Parameters
@@ -93,11 +95,11 @@ class OutputPacker:
         """
         numbers, work = self.pack_outputs(outcome.values), outcome.rhs_evaluations
         row = (outcome.status.name, outcome.message, work, wall_time, numbers)
-        return (cell_key, *row, compute_checksum(cell_key, *row))
+        return (cell_key, *row, compute_journal_row_checksum(cell_key, *row))
 
 
 @dataclass(frozen=True)
-class CellColumns:
+class CellResultArrays:
     """Arrays with the statuses, messages, costs and outputs of several cells.
 
     Parameters
@@ -121,7 +123,7 @@ class CellColumns:
     packed_outputs: np.ndarray
 
     @classmethod
-    def build_pending_cells(cls, cell_count: int, packed_number_count: int) -> CellColumns:
+    def build_for_pending_cells(cls, cell_count: int, packed_number_count: int) -> CellResultArrays:
         """Build the columns for cells that have not been computed.
 
         Parameters
@@ -145,7 +147,7 @@ class CellColumns:
         )
 
 
-def compute_checksum(
+def compute_journal_row_checksum(
     cell_key: bytes,
     status: str,
     message: str,

@@ -26,17 +26,17 @@ import numpy as np
 from rsfstudy.errors import DataError, shorten_text
 from rsfstudy.status import Status
 from rsfstudy.storage.cell_columns import (
-    CellColumns,
-    OutputPacker,
-    StoredCellRow,
-    compute_checksum,
+    CellJournalRow,
+    CellOutputPacker,
+    CellResultArrays,
+    compute_journal_row_checksum,
 )
 from rsfstudy.storage.fingerprints import find_fingerprint_differences, merge_fingerprints
 
 #: Version of the journal format. Increment the version if the tables, the checksum or the
 #: definition of the cell key change.
-_FORMAT_VERSION = 4
-_CREATE_TABLES = """
+_JOURNAL_FORMAT_VERSION = 4
+_SQL_TO_CREATE_TABLES = """
 CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS cells (
     key BLOB PRIMARY KEY, status TEXT, message TEXT, work INTEGER, seconds REAL, numbers BLOB,
@@ -44,13 +44,13 @@ CREATE TABLE IF NOT EXISTS cells (
 """
 #: Query for database objects that rsfstudy does not create. For example, a trigger in the file
 #: could run whenever rsfstudy writes to the journal.
-_FOREIGN_DATABASE_OBJECTS_QUERY = """
+_SQL_TO_FIND_FOREIGN_OBJECTS = """
 SELECT type || ' ' || name FROM sqlite_master
 WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
-_KEYS_PER_QUERY = 900
+_MAX_CELL_KEYS_PER_QUERY = 900
 #: Maximum time in s that a run waits for another run to release the journal.
-_LOCK_TIMEOUT = 5.0
+_JOURNAL_LOCK_TIMEOUT_SECONDS = 5.0
 _UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start again with --fresh."
 
 
@@ -84,25 +84,25 @@ class CellJournal:
         self,
         path: Path | None,
         fingerprint: Mapping[str, Any],
-        output_packer: OutputPacker,
+        output_packer: CellOutputPacker,
         *,
         fresh: bool = False,
     ) -> None:
         self._path, self._output_packer = path or Path("memory"), output_packer
-        ours = {**fingerprint, "journal": _FORMAT_VERSION}
+        ours = {**fingerprint, "journal": _JOURNAL_FORMAT_VERSION}
         wanted = json.dumps(ours, sort_keys=True)
         try:
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 if fresh:
                     _remove_journal(path)
-            self._db = _open_exclusively(path or ":memory:")
+            self._db = _open_locked_database(path or ":memory:")
         except (OSError, sqlite3.Error) as error:
             raise self._build_unusable_journal_error(error) from error
         try:
             theirs = self._read_or_store_fingerprint(wanted)
             if theirs != wanted:
-                self._accept_compatible_fingerprint(theirs, ours)
+                self._check_and_merge_fingerprints(theirs, ours)
         except sqlite3.Error as error:
             self._db.close()
             raise self._build_unusable_journal_error(error) from error
@@ -126,8 +126,8 @@ class CellJournal:
         If the journal is new, the method first stores ``run_fingerprint``.
         """
         with self._db:
-            self._db.executescript(_CREATE_TABLES)
-            others = self._db.execute(_FOREIGN_DATABASE_OBJECTS_QUERY).fetchall()
+            self._db.executescript(_SQL_TO_CREATE_TABLES)
+            others = self._db.execute(_SQL_TO_FIND_FOREIGN_OBJECTS).fetchall()
             if others:
                 found = shorten_text(others[0][0])
                 raise DataError(
@@ -139,7 +139,7 @@ class CellJournal:
                 self._db.execute("INSERT INTO fingerprint VALUES (?)", (run_fingerprint,))
         return run_fingerprint if row is None else row[0]
 
-    def _accept_compatible_fingerprint(
+    def _check_and_merge_fingerprints(
         self, stored_fingerprint: Any, run_fingerprint: Mapping[str, Any]
     ) -> None:
         """Check that the stored fingerprint is compatible with the fingerprint of a run.
@@ -179,7 +179,7 @@ class CellJournal:
         """Close the journal."""
         self._db.close()
 
-    def add_cells(self, cells: Iterable[StoredCellRow]) -> None:
+    def add_cells(self, journal_rows: Iterable[CellJournalRow]) -> None:
         """Add finished cells to the journal in one transaction.
 
         Parameters
@@ -196,12 +196,12 @@ class CellJournal:
         try:
             with self._db:
                 self._db.executemany(
-                    "INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?, ?, ?, ?)", cells
+                    "INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?, ?, ?, ?)", journal_rows
                 )
         except sqlite3.Error as error:
             raise DataError(f"cannot write to {self._path}: {error}.") from error
 
-    def statuses(self, cell_keys: np.ndarray) -> np.ndarray:
+    def read_statuses(self, cell_keys: np.ndarray) -> np.ndarray:
         """Return the statuses of cells.
 
         Parameters
@@ -226,7 +226,7 @@ class CellJournal:
             statuses[places] = [codes.get(name, int(Status.PENDING)) for (name,) in rows]
         return statuses
 
-    def read_cells(self, cell_keys: np.ndarray) -> CellColumns:
+    def read_cells(self, cell_keys: np.ndarray) -> CellResultArrays:
         """Read cells from the journal.
 
         Parameters
@@ -245,13 +245,13 @@ class CellJournal:
         DataError
             If the journal cannot be read, or if a row does not match its checksum.
         """
-        columns = CellColumns.build_pending_cells(
+        columns = CellResultArrays.build_for_pending_cells(
             len(cell_keys), self._output_packer.packed_number_count
         )
         what = "key, status, message, work, seconds, numbers, checksum"
         for places, rows in self._query_rows_of_cells(cell_keys, what):
             try:
-                _fill_cell_columns(columns, places, rows)
+                _copy_journal_rows_into_arrays(columns, places, rows)
             except (KeyError, OverflowError, TypeError, ValueError) as error:
                 raise DataError(
                     f"{self._path} is damaged: a cell does not match its checksum. "
@@ -267,8 +267,8 @@ class CellJournal:
         Each group consists of two lists. The first list contains indices into ``cell_keys``, and
         the second list contains the corresponding rows.
         """
-        for start in range(0, len(cell_keys), _KEYS_PER_QUERY):
-            wanted: list[bytes] = cell_keys[start : start + _KEYS_PER_QUERY].tolist()
+        for start in range(0, len(cell_keys), _MAX_CELL_KEYS_PER_QUERY):
+            wanted: list[bytes] = cell_keys[start : start + _MAX_CELL_KEYS_PER_QUERY].tolist()
             marks = ", ".join("?" * len(wanted))
             ask = f"SELECT key, {column_names} FROM cells WHERE key IN ({marks})"
             try:
@@ -282,26 +282,26 @@ class CellJournal:
                 yield [start + number for number in known], [rows[wanted[n]] for n in known]
 
 
-def _fill_cell_columns(
-    columns: CellColumns, cell_indices: list[int], stored_rows: list[Any]
+def _copy_journal_rows_into_arrays(
+    cell_arrays: CellResultArrays, cell_indices: list[int], journal_rows: list[Any]
 ) -> None:
     """Copy stored rows of the journal into columns.
 
     If a row is damaged, the function raises a ``KeyError``, ``OverflowError``, ``TypeError`` or
     ``ValueError``.
     """
-    if any(compute_checksum(*known) != checksum for *known, checksum in stored_rows):
+    if any(compute_journal_row_checksum(*known) != checksum for *known, checksum in journal_rows):
         raise ValueError("checksum")
-    _keys, status, message, work, seconds, numbers, _checksums = zip(*stored_rows, strict=True)
-    columns.statuses[cell_indices] = [Status[name] for name in status]
-    columns.messages[cell_indices], columns.rhs_evaluations[cell_indices] = message, work
-    columns.wall_times[cell_indices] = [math.nan if s is None else s for s in seconds]
+    _keys, status, message, work, seconds, numbers, _checksums = zip(*journal_rows, strict=True)
+    cell_arrays.statuses[cell_indices] = [Status[name] for name in status]
+    cell_arrays.messages[cell_indices], cell_arrays.rhs_evaluations[cell_indices] = message, work
+    cell_arrays.wall_times[cell_indices] = [math.nan if s is None else s for s in seconds]
     found = np.frombuffer(b"".join(numbers), dtype="<f8")
-    columns.packed_outputs[cell_indices] = found.reshape(len(stored_rows), -1)
+    cell_arrays.packed_outputs[cell_indices] = found.reshape(len(journal_rows), -1)
 
 
 @dataclass(frozen=True)
-class CellTimings:
+class CellWallTimes:
     """Wall times of the cells in a journal.
 
     Parameters
@@ -312,11 +312,11 @@ class CellTimings:
         Wall time in s by cell key. The mapping omits cells whose wall time is not in the journal.
     """
 
-    fingerprint: Mapping[str, Any]
+    run_fingerprint: Mapping[str, Any]
     seconds_by_cell_key: Mapping[bytes, float]
 
     @classmethod
-    def read(cls, path: Path) -> CellTimings | None:
+    def read_from_journal(cls, journal_path: Path) -> CellWallTimes | None:
         """Read the wall times of the cells in a journal.
 
         Parameters
@@ -330,7 +330,7 @@ class CellTimings:
             Wall times, or None if the journal does not exist, is damaged, or is locked by a run.
         """
         try:
-            uri = f"{path.resolve().as_uri()}?mode=ro"
+            uri = f"{journal_path.resolve().as_uri()}?mode=ro"
             with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
                 (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
                 seconds = db.execute(
@@ -341,9 +341,9 @@ class CellTimings:
             return None
 
 
-def _open_exclusively(path: Path | str) -> sqlite3.Connection:
+def _open_locked_database(path: Path | str) -> sqlite3.Connection:
     """Open a database, and lock the database until it is closed."""
-    db = sqlite3.connect(path, timeout=_LOCK_TIMEOUT)
+    db = sqlite3.connect(path, timeout=_JOURNAL_LOCK_TIMEOUT_SECONDS)
     try:
         db.execute("PRAGMA locking_mode = EXCLUSIVE")
         db.execute("BEGIN EXCLUSIVE")
@@ -366,7 +366,7 @@ def _remove_journal(path: Path) -> None:
     """
     if path.exists():
         try:
-            _open_exclusively(path).close()
+            _open_locked_database(path).close()
         except sqlite3.Error as error:
             if _is_database_locked_error(error):
                 raise

@@ -19,24 +19,30 @@ import xarray as xr
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.former_data_names import rename_former_fields
+from rsfstudy.former_data_names import rename_former_declaration_fields
 from rsfstudy.status import Status
 from rsfstudy.storage.fingerprints import find_fingerprint_differences
-from rsfstudy.storage.rebuild_from_file import find_primary_output
+from rsfstudy.storage.rebuild_from_file import find_primary_output_name
 from rsfstudy.storage.schema import is_of_single_scene, read_provenance
 from rsfstudy.vocabulary import TIMING_VARIABLES
 
-_AGREEMENT_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
+_AGREEMENT_TABLE_COLUMNS = [
+    "variable",
+    "values",
+    "identical",
+    "largest_difference",
+    "beyond_errors",
+]
 #: Entries of a fingerprint that are also part of the declaration.
 _FINGERPRINT_KEYS_ALSO_IN_DECLARATION = {"study", "measure", "rtol", "budget", "methods", "engine"}
 
-FirstAndSecondValue = tuple[Any, Any]
+ValuesInBothDatasets = tuple[Any, Any]
 
 
 # ---- one lattice --------------------------------------------------------------------------------
 
 
-def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
+def compare_results_of_same_study(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     """Compare two datasets of the same study, variable by variable.
 
     Only cells that are finished in both datasets are compared. Some variables, such as the results
@@ -61,17 +67,17 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     """
     if is_of_single_scene(first):
         return _compare_motions(first, second)
-    both = _finished_cell_mask(first) & _finished_cell_mask(second)
+    both = _find_finished_cells(first) & _find_finished_cells(second)
     rows = []
     for name, values in first.data_vars.items():
         if name in TIMING_VARIABLES:
             continue
         if set(both.dims) <= set(values.dims):
             known = both.broadcast_like(values).transpose(*values.dims).values
-            rows.append(_variable_agreement(name, first, second, known))
+            rows.append(_compare_variable(name, first, second, known))
         elif bool(both.all()):  # Reductions of incomplete datasets may use different cells.
-            rows.append(_variable_agreement(name, first, second))
-    return _agreement_table(
+            rows.append(_compare_variable(name, first, second))
+    return _build_agreement_table(
         rows, *(read_provenance(dataset)["fingerprint"] for dataset in (first, second))
     )
 
@@ -79,30 +85,30 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
 def _compare_motions(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     """Compare two motions of one scene."""
     rows = [
-        _variable_agreement(n, first, second)
-        for n, values in first.variables.items()
-        if values.dims
+        _compare_variable(n, first, second) for n, values in first.variables.items() if values.dims
     ]
     made = ({"source": str(d.attrs.get("source", "unknown"))} for d in (first, second))
-    return _agreement_table(rows, *made)
+    return _build_agreement_table(rows, *made)
 
 
-def _agreement_table(
-    variable_rows: Sequence[dict[str, Any]], first: Mapping[str, Any], second: Mapping[str, Any]
+def _build_agreement_table(
+    variable_rows: Sequence[dict[str, Any]],
+    first_fingerprint: Mapping[str, Any],
+    second_fingerprint: Mapping[str, Any],
 ) -> pd.DataFrame:
     """Build the table of compared variables, with fingerprint differences in attrs."""
-    frame = pd.DataFrame(variable_rows, columns=_AGREEMENT_COLUMNS)
-    frame.attrs["differs"] = find_fingerprint_differences(first, second)
+    frame = pd.DataFrame(variable_rows, columns=_AGREEMENT_TABLE_COLUMNS)
+    frame.attrs["differs"] = find_fingerprint_differences(first_fingerprint, second_fingerprint)
     return frame
 
 
-def _finished_cell_mask(dataset: xr.Dataset) -> xr.DataArray:
+def _find_finished_cells(dataset: xr.Dataset) -> xr.DataArray:
     """Return an array that is True for finished cells."""
     return dataset["status"] != int(Status.PENDING)
 
 
-def _variable_agreement(
-    variable_name: Hashable, first: xr.Dataset, second: xr.Dataset, common_cell_mask: Any = ...
+def _compare_variable(
+    variable_name: Hashable, first: xr.Dataset, second: xr.Dataset, compared_cells_mask: Any = ...
 ) -> dict[str, Any]:
     """Compare one variable in the cells that are finished in both datasets.
 
@@ -113,7 +119,7 @@ def _variable_agreement(
     found: dict[str, Any] = {"variable": variable_name, "values": a.size, "identical": 0}
     if b is None or a.shape != b.shape or (a.dtype.kind == "f") != (b.dtype.kind == "f"):
         return found
-    x, y = a.values[common_cell_mask], b.values[common_cell_mask]
+    x, y = a.values[compared_cells_mask], b.values[compared_cells_mask]
     if a.dtype.kind != "f":
         return found | {"values": x.size, "identical": int(np.sum(x == y))}
     gap = np.abs(x - y)
@@ -122,7 +128,7 @@ def _variable_agreement(
     found["largest_difference"] = float(np.max(gap[~same], initial=0.0))
     errors = [d[f"{variable_name}_error"] for d in (first, second) if f"{variable_name}_error" in d]
     if [error.shape for error in errors] == [a.shape, a.shape]:
-        allowed = errors[0].values[common_cell_mask] + errors[1].values[common_cell_mask]
+        allowed = errors[0].values[compared_cells_mask] + errors[1].values[compared_cells_mask]
         # Comparisons with NaN are False, so a missing value or a missing error estimate counts as a
         # difference beyond the errors.
         found["beyond_errors"] = int((~same & ~(gap <= allowed)).sum())
@@ -137,7 +143,7 @@ def _variable_agreement(
 @add_former_member_names
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
-class Comparison:
+class ResultsComparison:
     """Differences between two results datasets.
 
     Parameters
@@ -169,8 +175,8 @@ class Comparison:
         Reason why a variable is not compared, by name of the variable.
     """
 
-    declaration: Mapping[str, FirstAndSecondValue]
-    origin: Mapping[str, FirstAndSecondValue]
+    declaration: Mapping[str, ValuesInBothDatasets]
+    origin: Mapping[str, ValuesInBothDatasets]
     differing_axis_points: Mapping[str, tuple[list[Any], list[Any]]]
     finished_cell_counts: tuple[int, int, int]
     statuses: pd.DataFrame
@@ -192,7 +198,7 @@ class Comparison:
         return self.finished_cell_counts[0] > 0 and self.statuses.empty and not self.beyond_errors
 
 
-def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
+def compare_results(first: xr.Dataset, second: xr.Dataset) -> ResultsComparison:
     """Compare two results datasets in the cells with equal coordinates.
 
     If a field is an axis in one dataset and has a fixed value in the other dataset, only the cells
@@ -222,22 +228,26 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     labelled = [
         dataset.assign_coords(_round_coordinates_for_alignment(dataset)) for dataset in both
     ]
-    left_out = _uncompared_variables(labelled)
+    left_out = _find_uncomparable_variables(labelled)
     kept = [dataset.drop_vars(left_out, errors="ignore") for dataset in labelled]
     shared = [one.transpose(*dims, ...) for one in xr.align(*kept, join="inner")]
-    _check_same_axis_points(*shared)
+    _check_axis_points_have_same_values(*shared)
     indexes = [[dataset.indexes[d] for dataset in labelled] for d in dims]
     points = {
         d: (a.difference(b, sort=False).tolist(), b.difference(a, sort=False).tolist())
         for d, (a, b) in zip(dims, indexes, strict=True)
         if set(a) != set(b)
     }
-    known = _finished_cell_mask(shared[0]) & _finished_cell_mask(shared[1])
-    alone = [int(_finished_cell_mask(dataset).sum() - known.sum()) for dataset in both]
-    return Comparison(
+    known = _find_finished_cells(shared[0]) & _find_finished_cells(shared[1])
+    alone = [int(_find_finished_cells(dataset).sum() - known.sum()) for dataset in both]
+    return ResultsComparison(
         declaration=find_fingerprint_differences(
             *(
-                dict(_flatten_declaration(rename_former_fields(json.loads(d.attrs["declaration"]))))
+                dict(
+                    _flatten_declaration(
+                        rename_former_declaration_fields(json.loads(d.attrs["declaration"]))
+                    )
+                )
                 for d in both
             )
         ),
@@ -247,12 +257,12 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
         differing_axis_points=points,
         finished_cell_counts=(int(known.sum()), alone[0], alone[1]),
         statuses=_compare_statuses_of_shared_cells(shared, known),
-        agreement_table=_compare_numbers_of_shared_cells(shared),
+        agreement_table=_compare_variables_of_shared_cells(shared),
         uncompared_variables=left_out,
     )
 
 
-def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+def _add_axes_of_other_dataset(dataset: xr.Dataset, other_dataset: xr.Dataset) -> xr.Dataset:
     """Add the missing axes to a dataset.
 
     If ``other`` has axes that ``dataset`` does not have, the function adds these axes to
@@ -260,7 +270,7 @@ def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dat
     ``dataset``.
     """
     cells = set(dataset["status"].dims)
-    for dimension in other["status"].dims:
+    for dimension in other_dataset["status"].dims:
         if dimension in cells:
             continue
         if dimension not in dataset.coords or dataset[dimension].ndim:
@@ -292,7 +302,7 @@ def _round_coordinates_for_alignment(dataset: xr.Dataset) -> dict[str, Any]:
     return labels
 
 
-def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
+def _check_axis_points_have_same_values(first: xr.Dataset, second: xr.Dataset) -> None:
     """Check that points with the same label have the same field values.
 
     The check ignores differences that are as small as rounding errors.
@@ -313,7 +323,7 @@ def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
             raise InvalidValue("axis", ", ".join(map(str, one.dims)), rule, remedy=remedy)
 
 
-def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, str]:
+def _find_uncomparable_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, str]:
     """Find the variables that cannot be compared, and the reason for each variable."""
     first, second = aligned_datasets
     unequal = {
@@ -331,49 +341,53 @@ def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, s
     return why
 
 
-def _compare_numbers_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
+def _compare_variables_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
     """Compare the numeric variables in the cells that both datasets share.
 
     If the primary output has no error estimates, each of its values that differs is counted in
     ``beyond_errors``.
     """
-    frame = compare_same_lattice(*shared_cells)
-    about = find_primary_output(shared_cells[0])
+    frame = compare_results_of_same_study(*shared_cells)
+    about = find_primary_output_name(shared_cells[0])
     exact = (frame["variable"] == about) & frame["beyond_errors"].isna()
     frame.loc[exact, "beyond_errors"] = (frame["values"] - frame["identical"])[exact]
     return frame
 
 
 def _compare_statuses_of_shared_cells(
-    shared_cells: Sequence[xr.Dataset], common_cell_mask: xr.DataArray
+    shared_cells: Sequence[xr.Dataset], compared_cells_mask: xr.DataArray
 ) -> pd.DataFrame:
     """Build a table of the cells with different statuses."""
     first, second = (one["status"].reset_coords(drop=True) for one in shared_cells)
-    both = xr.Dataset({"first": first, "second": second, "known": common_cell_mask}).reset_coords(
-        drop=True
-    )
+    both = xr.Dataset(
+        {"first": first, "second": second, "known": compared_cells_mask}
+    ).reset_coords(drop=True)
     frame = both.to_dataframe(dim_order=[*map(str, first.dims)]).reset_index()
     ended = frame[frame["known"] & (frame["first"] != frame["second"])].drop(columns="known")
     labels = Status.labels_by_code()
     return ended.replace({"first": labels, "second": labels}).reset_index(drop=True)
 
 
-def _flatten_declaration(declaration_part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def _flatten_declaration(
+    declaration_part: Any, path_in_declaration: str = ""
+) -> Iterator[tuple[str, Any]]:
     """Yield the path and value of each entry of a declaration.
 
     A list of plain values is yielded as a single entry.
     """
     if isinstance(declaration_part, dict) and declaration_part:
         for name, value in declaration_part.items():
-            yield from _flatten_declaration(value, f"{path}.{name}" if path else name)
+            yield from _flatten_declaration(
+                value, f"{path_in_declaration}.{name}" if path_in_declaration else name
+            )
     elif isinstance(declaration_part, list) and any(
         isinstance(value, dict) for value in declaration_part
     ):
         for number, value in enumerate(declaration_part):
             named = value.get("dimension") if isinstance(value, dict) else None
-            yield from _flatten_declaration(value, f"{path}[{named or number}]")
+            yield from _flatten_declaration(value, f"{path_in_declaration}[{named or number}]")
     else:
-        yield path, declaration_part
+        yield path_in_declaration, declaration_part
 
 
 def _read_versions_and_machine(dataset: xr.Dataset) -> dict[str, Any]:

@@ -19,10 +19,10 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import DataError, shorten_text
-from rsfstudy.quantities import units_or_scale_of_variable
+from rsfstudy.quantities import read_units_or_scale
 
 #: Name of the attribute that contains the digest of the contents.
-DIGEST_ATTRIBUTE = "content_digest"
+CONTENT_DIGEST_ATTRIBUTE = "content_digest"
 #: Names of the attributes that the digest includes. These attributes affect how rsfstudy interprets
 #: the numbers.
 _NAMES_OF_DIGESTED_ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
@@ -41,10 +41,10 @@ def compute_content_digest(dataset: xr.Dataset) -> str:
     str
         JSON object with the digest of each variable and the digest of each included attribute.
     """
-    return json.dumps(_compute_digests(dataset))
+    return json.dumps(_compute_variable_and_attribute_digests(dataset))
 
 
-def check_content(dataset: xr.Dataset, path: str) -> None:
+def check_content_digest(dataset: xr.Dataset, path: str) -> None:
     """Check the contents of a dataset against its digest.
 
     A dataset without a digest is not checked. The function checks only attributes and variables
@@ -64,11 +64,14 @@ def check_content(dataset: xr.Dataset, path: str) -> None:
     DataError
         If a number, a string or the declaration does not match the digest.
     """
-    if DIGEST_ATTRIBUTE not in dataset.attrs:
+    if CONTENT_DIGEST_ATTRIBUTE not in dataset.attrs:
         return
-    listed, found = _parse_digest(dataset.attrs[DIGEST_ATTRIBUTE]), _compute_digests(dataset)
+    listed, found = (
+        _parse_digest(dataset.attrs[CONTENT_DIGEST_ATTRIBUTE]),
+        _compute_variable_and_attribute_digests(dataset),
+    )
     if not listed:
-        raise _build_damaged_file_error(path, DIGEST_ATTRIBUTE)
+        raise _build_damaged_file_error(path, CONTENT_DIGEST_ATTRIBUTE)
     for name in [name for name in found if name in listed]:
         (form, _, digest), (form_now, _, digest_now) = (
             each[name].rpartition(" ") for each in (listed, found)
@@ -82,11 +85,11 @@ def _build_damaged_file_error(path: str, part_name: str) -> DataError:
     return DataError(
         f"{path} is damaged or was edited, because {shorten_text(part_name)} does not match its "
         "digest. Run the study again. If you changed the file on purpose, delete the attribute "
-        f"{DIGEST_ATTRIBUTE} and save the file again."
+        f"{CONTENT_DIGEST_ATTRIBUTE} and save the file again."
     )
 
 
-def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
+def _compute_variable_and_attribute_digests(dataset: xr.Dataset) -> dict[str, str]:
     """Compute one digest for each variable and each attribute.
 
     The entry of a variable consists of its sizes, units and scale, followed by the digest of its
@@ -101,8 +104,8 @@ def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
         f"attribute {name}": f"text {_hash_bytes(text.encode())}" for name, text in texts.items()
     }
     for name, values in dataset.variables.items():
-        form = f"{dict(values.sizes)} {units_or_scale_of_variable(values.attrs)}"
-        found[str(name)] = f"{form} {_hash_bytes(_array_to_portable_bytes(values.values))}"
+        form = f"{dict(values.sizes)} {read_units_or_scale(values.attrs)}"
+        found[str(name)] = f"{form} {_hash_bytes(_convert_array_to_portable_bytes(values.values))}"
     return found
 
 
@@ -111,7 +114,7 @@ def _hash_bytes(content: bytes) -> str:
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
-def _array_to_portable_bytes(values: np.ndarray) -> bytes:
+def _convert_array_to_portable_bytes(values: np.ndarray) -> bytes:
     """Convert an array to bytes that do not depend on the storage format."""
     if values.dtype.kind in "OUTS":
         return json.dumps([str(text) for text in values.flat]).encode()

@@ -26,8 +26,8 @@ import xarray as xr
 from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten_text
 from rsfstudy.former_data_names import rename_former_variables
-from rsfstudy.netcdf_encoding import copy_with_cf_encoding, encoding_without_fill_values
-from rsfstudy.path_checks import check_path
+from rsfstudy.netcdf_encoding import build_encoding_without_fill_values, copy_with_cf_encoding
+from rsfstudy.path_checks import check_path_is_valid
 from rsfstudy.storage import content_digest, schema
 from rsfstudy.storage.attribute_checks import (
     check_motion_variables_are_numeric,
@@ -46,9 +46,9 @@ ZARR_OPEN_OPTIONS: Mapping[str, Any] = {
 #: Names of the codecs that a Zarr store may use. A store with any other codec is rejected, because
 #: the codec could run arbitrary code.
 _ALLOWED_ZARR_CODECS = {"bytes", "vlen-utf8", "zstd"}
-_DIGEST_TRAILER_PREFIX = b"\nrsfstudy sha256 "
-_DIGEST_TRAILER_LENGTH = len(_DIGEST_TRAILER_PREFIX) + 64
-_STORE_DIGEST_ATTRIBUTE = "digest"
+_PREFIX_OF_DIGEST_AT_FILE_END = b"\nrsfstudy sha256 "
+_LENGTH_OF_DIGEST_AT_FILE_END = len(_PREFIX_OF_DIGEST_AT_FILE_END) + 64
+_ZARR_DIGEST_ATTRIBUTE = "digest"
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
@@ -79,8 +79,8 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     clean = convert_attributes_for_netcdf(
         dataset.assign_attrs({"layout": FILE_LAYOUT_VERSION, **dataset.attrs})
     )
-    clean.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
-    digest = {content_digest.DIGEST_ATTRIBUTE: content_digest.compute_content_digest(clean)}
+    clean.attrs.pop(content_digest.CONTENT_DIGEST_ATTRIBUTE, None)
+    digest = {content_digest.CONTENT_DIGEST_ATTRIBUTE: content_digest.compute_content_digest(clean)}
     stored = clean.assign_attrs(digest)
     beside = path.with_name(f".{path.name}.new")
     try:
@@ -91,9 +91,12 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         with dask.config.set(scheduler="synchronous"), warnings.catch_warnings():
             # Older versions of Dask warn that the client is not used, which is intended here.
             warnings.filterwarnings("ignore", "Running on a single-machine scheduler", UserWarning)
-            stored.to_netcdf(beside, **how, encoding=encoding_without_fill_values(clean))
+            stored.to_netcdf(beside, **how, encoding=build_encoding_without_fill_values(clean))
         with open(beside, "ab") as file:
-            file.write(_DIGEST_TRAILER_PREFIX + _hash_file_contents(beside, beside.stat().st_size))
+            file.write(
+                _PREFIX_OF_DIGEST_AT_FILE_END
+                + _hash_first_bytes_of_file(beside, beside.stat().st_size)
+            )
         with xr.open_dataset(beside, engine="netcdf4") as back:
             if not stored.identical(back.load()):
                 raise DataError(
@@ -117,7 +120,7 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     return clean
 
 
-def _hash_file_contents(path: Path, byte_count: int) -> bytes:
+def _hash_first_bytes_of_file(path: Path, byte_count: int) -> bytes:
     """Compute the SHA-256 digest of the first bytes of a file."""
     digest = hashlib.sha256()
     with open(path, "rb") as file:
@@ -155,7 +158,7 @@ def open_zarr_store(path: Path) -> xr.Dataset:
     return dataset
 
 
-def write_store_digest(store: Path) -> None:
+def write_zarr_store_digest(store: Path) -> None:
     """Write the digest of all files of a Zarr store to its attributes.
 
     Parameters
@@ -165,11 +168,11 @@ def write_store_digest(store: Path) -> None:
     """
     root = store / "zarr.json"
     about = json.loads(root.read_text())
-    about["attributes"][_STORE_DIGEST_ATTRIBUTE] = _hash_store(store)
+    about["attributes"][_ZARR_DIGEST_ATTRIBUTE] = _hash_zarr_store(store)
     root.write_text(json.dumps(about, indent=2))
 
 
-def _hash_store(store: Path) -> str:
+def _hash_zarr_store(store: Path) -> str:
     """Compute the digest of all files of a Zarr store.
 
     The root attribute that contains the digest is not included.
@@ -179,39 +182,39 @@ def _hash_store(store: Path) -> str:
         content = file.read_bytes()
         if file == store / "zarr.json":
             about = json.loads(content)
-            about["attributes"].pop(_STORE_DIGEST_ATTRIBUTE, None)
+            about["attributes"].pop(_ZARR_DIGEST_ATTRIBUTE, None)
             content = json.dumps(about, sort_keys=True).encode()
         digest.update(f"{file.relative_to(store)} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
-def _check_store_digest(path: Path) -> bool:
+def _check_zarr_store_digest(path: Path) -> bool:
     """Check a Zarr store against its digest.
 
     If the store has no digest, the function returns False.
     """
     attributes = json.loads((path / "zarr.json").read_text())["attributes"]
-    if _STORE_DIGEST_ATTRIBUTE in attributes and attributes[_STORE_DIGEST_ATTRIBUTE] != _hash_store(
-        path
-    ):
+    if _ZARR_DIGEST_ATTRIBUTE in attributes and attributes[
+        _ZARR_DIGEST_ATTRIBUTE
+    ] != _hash_zarr_store(path):
         raise DataError(
             f"{path} is damaged or was edited, because its files do not match the digest."
         )
-    return _STORE_DIGEST_ATTRIBUTE in attributes
+    return _ZARR_DIGEST_ATTRIBUTE in attributes
 
 
-def _check_file_digest(path: Path) -> bool:
+def _check_digest_at_file_end(path: Path) -> bool:
     """Check a file against the digest at its end.
 
     If the file has no digest at its end, the function returns False.
     """
-    size = path.stat().st_size - _DIGEST_TRAILER_LENGTH
+    size = path.stat().st_size - _LENGTH_OF_DIGEST_AT_FILE_END
     with open(path, "rb") as file:
         file.seek(max(0, size))
         trailer = file.read()
-    if not trailer.startswith(_DIGEST_TRAILER_PREFIX):
+    if not trailer.startswith(_PREFIX_OF_DIGEST_AT_FILE_END):
         return False
-    if trailer != _DIGEST_TRAILER_PREFIX + _hash_file_contents(path, size):
+    if trailer != _PREFIX_OF_DIGEST_AT_FILE_END + _hash_first_bytes_of_file(path, size):
         raise DataError(
             f"{path} is damaged or was edited, because its contents do not match the digest."
         )
@@ -248,14 +251,14 @@ def read_dataset(path: Path) -> xr.Dataset:
         _check_readable_path(path, where)
         if path.is_dir():
             _check_zarr_codecs(path)
-            sealed = _check_store_digest(path)
+            sealed = _check_zarr_store_digest(path)
             dataset = open_zarr_store(path)
         else:
-            sealed = _check_file_digest(path)
+            sealed = _check_digest_at_file_end(path)
             dataset = xr.load_dataset(path, engine="netcdf4")
             if not sealed:
-                content_digest.check_content(dataset, where)
-            dataset.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
+                content_digest.check_content_digest(dataset, where)
+            dataset.attrs.pop(content_digest.CONTENT_DIGEST_ATTRIBUTE, None)
     except RsfStudyError:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise errors of many types.
@@ -266,7 +269,7 @@ def read_dataset(path: Path) -> xr.Dataset:
         if schema.is_of_single_scene(dataset):
             check_motion_variables_are_numeric(dataset)
             return dataset  # Users save motions with xarray, which writes no digest.
-        schema.check_results(dataset)
+        schema.check_results_dataset(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
     if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
@@ -282,7 +285,7 @@ def _check_readable_path(path: Path, file_description: str) -> None:
 
     The check is needed because opening a pipe could block forever.
     """
-    check_path("file", path)
+    check_path_is_valid("file", path)
     if not path.exists():
         raise DataError(
             f"{file_description} does not exist. Run the study first, or pass the path of another "
@@ -334,13 +337,13 @@ def convert_attributes_for_netcdf(dataset: xr.Dataset) -> xr.Dataset:
 def _convert_attribute_mapping_for_netcdf(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     """Convert a mapping of attributes, and omit attributes that are None."""
     return {
-        str(name): _to_netcdf_value(value)
+        str(name): _convert_attribute_value_for_netcdf(value)
         for name, value in attributes.items()
         if value is not None
     }
 
 
-def _to_netcdf_value(value: Any) -> Any:
+def _convert_attribute_value_for_netcdf(value: Any) -> Any:
     """Convert the value of an attribute to a type that NetCDF preserves."""
     if isinstance(value, bool | np.bool_):
         return "true" if value else "false"
@@ -348,5 +351,11 @@ def _to_netcdf_value(value: Any) -> Any:
         return json.dumps(value)
     if isinstance(value, list | tuple | np.ndarray):
         values = np.asarray(value)
-        return values if values.size > 1 else _to_netcdf_value(values.item()) if values.size else ""
+        return (
+            values
+            if values.size > 1
+            else _convert_attribute_value_for_netcdf(values.item())
+            if values.size
+            else ""
+        )
     return value

@@ -11,14 +11,14 @@ import xarray as xr
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import SampledHistory, Scene, SceneFields, UserLoading, UserPart, protocol
-from rsfstudy.storage.declarations import build_scene_from_stored
+from rsfstudy.storage.declarations import build_scene_from_stored_fields
 from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
-from rsfstudy.storage.plain_data import invalid_part_error
+from rsfstudy.storage.plain_data import build_invalid_entry_error
 from rsfstudy.storage.schema import read_scene_fields
 from rsfstudy.study import Study
 
 
-def scene_of_dataset(dataset: xr.Dataset, study: Study | None) -> Scene:
+def rebuild_scene(dataset: xr.Dataset, study: Study | None) -> Scene:
     """Return the scene of a dataset.
 
     Parameters
@@ -105,22 +105,22 @@ def read_scene_from_attributes(dataset: xr.Dataset) -> Scene:
     segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
     digest = plain.pop("samples", "")
     own: dict[str, UserPart] = {
-        name: part for slot in SceneFields.SLOTS for name, part in slot.user_parts.items()
+        name: part for slot in SceneFields.PART_SLOTS for name, part in slot.user_parts.items()
     }
     # Protocols with the same name can differ, so the protocol is rebuilt from its segments.
     if segments and (loading not in own or isinstance(own[loading], UserLoading)):
         rebuilt = protocol(segments, loading)
-        own[SceneFields.normalise_value("loading", rebuilt)] = rebuilt
+        own[SceneFields.replace_part_or_alias_by_part_name("loading", rebuilt)] = rebuilt
     if digest:
         told = dataset["history_samples"]
         pressure, stress = (bool(told.attrs.get(n)) for n in ("of_pressure", "of_stress"))
         sampled = SampledHistory.from_table(told.values, stress, loading, of_pressure=pressure)
         if sampled.digest != digest:
-            raise invalid_part_error(
+            raise build_invalid_entry_error(
                 "history_samples", f"do not match the digest of the scene ({digest})"
             )
-        own[SceneFields.normalise_value("loading", sampled)] = sampled
-    for slot in SceneFields.SLOTS:
+        own[SceneFields.replace_part_or_alias_by_part_name("loading", sampled)] = sampled
+    for slot in SceneFields.PART_SLOTS:
         name = plain.get(slot.name)
         if isinstance(name, str) and name not in {*slot.built_in_parts, *own}:
             remedy = (
@@ -129,4 +129,4 @@ def read_scene_from_attributes(dataset: xr.Dataset) -> Scene:
             )
             rule = "is a user-defined part that is not registered"
             raise InvalidValue(slot.name, name, rule, remedy=remedy)
-    return build_scene_from_stored(plain, own, "scene")
+    return build_scene_from_stored_fields(plain, own, "scene")

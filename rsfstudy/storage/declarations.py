@@ -18,35 +18,42 @@ import msgspec
 from rsfstudy import measures, reductions
 from rsfstudy.axes import Axis
 from rsfstudy.errors import InvalidValue
-from rsfstudy.former_data_names import rename_former_fields
+from rsfstudy.former_data_names import rename_former_declaration_fields
 from rsfstudy.measures import Measure
 from rsfstudy.motion import Accuracy
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig import Rig
-from rsfstudy.slider import BUILT_IN_PARTS, Scene, SceneFields, UserLoading, UserPart
+from rsfstudy.slider import BUILT_IN_FLUID_CLASS_BY_NAME, Scene, SceneFields, UserLoading, UserPart
 from rsfstudy.storage.plain_data import (
-    build_from_plain_data,
-    call_with_fields,
-    convert_fields,
+    build_dataclass_from_plain_data,
+    build_invalid_entry_error,
+    construct_from_field_values,
     convert_plain_data,
-    invalid_part_error,
+    convert_plain_field_values,
 )
-from rsfstudy.study import Claim, load_study, study_names
+from rsfstudy.study import Claim, list_study_names, load_study
 
 MISSING_STUDY_FILE_REMEDY = "Pass the file that defines it: --study FILE (study=)."
 #: Maximum number of claims of a study. Checking a larger number of claims would take minutes.
 _MAX_CLAIMS = 10_000
 #: Type of the integer fields of measures and reductions. The range is limited because a larger
 #: number of points would not fit in memory.
-_Count = Annotated[int, msgspec.Meta(ge=-10_000_000, le=10_000_000)]
+_BoundedInteger = Annotated[int, msgspec.Meta(ge=-10_000_000, le=10_000_000)]
 #: Type of the stored fields of a scene. A user-defined part is stored as the name of the part.
-StoredScene = Mapping[str, float | str | bool | None]
+StoredSceneFields = Mapping[str, float | str | bool | None]
 #: Default values of scene fields that are missing in older files. Only the fields that select a
 #: part have a default value. Any other missing field must remain None, because the parts of the
 #: scene may not have this field.
-_DEFAULTS_OF_MISSING_FIELDS: Mapping[str, Any] = {
-    **{n: v if isinstance(v, str) else None for n, v in SceneFields.OMITTED_DEFAULTS.items()},
-    **{name: None for part in BUILT_IN_PARTS.values() for name in SceneFields.names_of_part(part)},
+_DEFAULTS_OF_MISSING_SCENE_FIELDS: Mapping[str, Any] = {
+    **{
+        n: v if isinstance(v, str) else None
+        for n, v in SceneFields.DEFAULTS_OMITTED_FROM_STORED_SCENES.items()
+    },
+    **{
+        name: None
+        for part in BUILT_IN_FLUID_CLASS_BY_NAME.values()
+        for name in SceneFields.list_names_of_part(part)
+    },
     "fluid": "drained",
 }
 
@@ -76,7 +83,7 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     units: Mapping[str, str] | None = None
     drawn: Mapping[str, Any] | None = None
 
-    def build(self, user_parts: Mapping[str, UserPart] = MappingProxyType({})) -> Axis:
+    def build_axis(self, user_parts: Mapping[str, UserPart] = MappingProxyType({})) -> Axis:
         """Build the axis.
 
         Parameters
@@ -99,20 +106,20 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             named = Axis(self.dimension, self.values, self.units, self.drawn)
         except InvalidValue as error:
             path = f"declaration.axes.{self.dimension}"
-            raise invalid_part_error(path, f"is invalid ({error})") from error
+            raise build_invalid_entry_error(path, f"is invalid ({error})") from error
         if not user_parts:
             return named
         rows = [SceneFields.replace_names_by_user_parts(row, user_parts) for row in named.rows]
         return named.with_rows(rows, named.units, named.sampling_info)
 
 
-class _StoredMeasure(msgspec.Struct):
+class _StoredMeasureDeclaration(msgspec.Struct):
     """Entries required in every measure declaration."""
 
     name: str
 
 
-class _StoredReduction(msgspec.Struct):
+class _StoredReductionDeclaration(msgspec.Struct):
     """Entries required in every reduction declaration."""
 
     kind: str
@@ -120,7 +127,7 @@ class _StoredReduction(msgspec.Struct):
     of: str
 
 
-class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class StoredStudyDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Declaration of the study, as stored in the attribute ``declaration``.
 
     Parameters
@@ -159,7 +166,7 @@ class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     title: str
     summary: str
     version: int
-    base: StoredScene
+    base: StoredSceneFields
     axes: Sequence[StoredAxis]
     measure: Mapping[str, Any]
     accuracy: Any
@@ -171,7 +178,7 @@ class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     laboratory: Mapping[str, float] | None = None
 
 
-def parse_declaration(plain_data: Any) -> StoredDeclaration:
+def parse_study_declaration(plain_data: Any) -> StoredStudyDeclaration:
     """Convert plain data to a declaration.
 
     Parameters
@@ -189,24 +196,28 @@ def parse_declaration(plain_data: Any) -> StoredDeclaration:
     DataError
         If an entry is missing, unknown or invalid.
     """
-    current = rename_former_fields(plain_data)
-    declared = convert_plain_data(current, StoredDeclaration, "declaration")
+    current = rename_former_declaration_fields(plain_data)
+    declared = convert_plain_data(current, StoredStudyDeclaration, "declaration")
     # Other fields of measures and reductions are checked when a study is built.
-    convert_plain_data(declared.measure, _StoredMeasure, "declaration.measure")
-    convert_plain_data(declared.reductions, list[_StoredReduction], "declaration.reductions")
-    made: StoredDeclaration = msgspec.structs.replace(
+    convert_plain_data(declared.measure, _StoredMeasureDeclaration, "declaration.measure")
+    convert_plain_data(
+        declared.reductions, list[_StoredReductionDeclaration], "declaration.reductions"
+    )
+    made: StoredStudyDeclaration = msgspec.structs.replace(
         declared,
-        accuracy=build_from_plain_data(declared.accuracy, Accuracy, "declaration.accuracy"),
+        accuracy=build_dataclass_from_plain_data(
+            declared.accuracy, Accuracy, "declaration.accuracy"
+        ),
         claims=[
-            build_from_plain_data(claim, Claim, f"declaration.claims[{number}]")
+            build_dataclass_from_plain_data(claim, Claim, f"declaration.claims[{number}]")
             for number, claim in enumerate(declared.claims)
         ],
     )
     return made
 
 
-def build_scene_from_stored(
-    stored_scene: StoredScene,
+def build_scene_from_stored_fields(
+    stored_fields: StoredSceneFields,
     user_parts: Mapping[str, UserPart] = MappingProxyType({}),
     path_in_file: str = "declaration.base",
 ) -> Scene:
@@ -233,22 +244,22 @@ def build_scene_from_stored(
     """
     parts = [
         part
-        for part in SceneFields.replace_names_by_user_parts(stored_scene, user_parts).values()
+        for part in SceneFields.replace_names_by_user_parts(stored_fields, user_parts).values()
         if isinstance(part, type | UserLoading)
     ]
-    values = convert_fields(
-        {**_DEFAULTS_OF_MISSING_FIELDS, **stored_scene},
-        tuple(SceneFields.types_with_user_parts(parts).items()),
+    values = convert_plain_field_values(
+        {**_DEFAULTS_OF_MISSING_SCENE_FIELDS, **stored_fields},
+        tuple(SceneFields.collect_types_with_user_parts(parts).items()),
         path_in_file,
     )
-    scene: Scene = call_with_fields(
+    scene: Scene = construct_from_field_values(
         Scene, SceneFields.replace_names_by_user_parts(values, user_parts), path_in_file
     )
     return scene
 
 
 def find_user_part_missing_from_file(
-    declaration: StoredDeclaration, stored_loadings: Collection[str] = ()
+    declaration: StoredStudyDeclaration, stored_loadings: Collection[str] = ()
 ) -> tuple[str, str] | None:
     """Find a user-defined part that is missing in the results file.
 
@@ -266,15 +277,15 @@ def find_user_part_missing_from_file(
     """
     rows: list[Mapping[str, Any]] = [declaration.base]
     for axis in declaration.axes:
-        rows += axis.build().rows
-    for slot in SceneFields.SLOTS:
+        rows += axis.build_axis().rows
+    for slot in SceneFields.PART_SLOTS:
         for name in {row.get(slot.name): None for row in rows}:
             if isinstance(name, str) and name not in (*slot.built_in_parts, *stored_loadings):
                 return slot.name, name
     return None
 
 
-def build_rig(quantities: Mapping[str, float]) -> Rig:
+def build_rig(rig_quantities: Mapping[str, float]) -> Rig:
     """Build a rig from its quantities.
 
     Parameters
@@ -292,11 +303,11 @@ def build_rig(quantities: Mapping[str, float]) -> Rig:
     DataError
         If a quantity is unknown.
     """
-    types = tuple((name, float) for name in Rig.__dataclass_fields__ if name in quantities)
-    return Rig(**convert_fields(quantities, types, "declaration.laboratory"))
+    types = tuple((name, float) for name in Rig.__dataclass_fields__ if name in rig_quantities)
+    return Rig(**convert_plain_field_values(rig_quantities, types, "declaration.laboratory"))
 
 
-def build_measure(plain_measure: Mapping[str, Any], path_in_file: str) -> Measure:
+def build_measure(measure_declaration: Mapping[str, Any], path_in_file: str) -> Measure:
     """Build a measure from its description.
 
     Parameters
@@ -318,18 +329,20 @@ def build_measure(plain_measure: Mapping[str, Any], path_in_file: str) -> Measur
     DataError
         If a field is missing, unknown or invalid.
     """
-    values: dict[str, Any] = dict(plain_measure)
-    kind = _find_class("measure", Measure, measures, values.pop("name"))
+    values: dict[str, Any] = dict(measure_declaration)
+    kind = _find_declared_class("measure", Measure, measures, values.pop("name"))
     given = dict(kind.fields_from_description(values, path_in_file))
     if isinstance(values.get("measure"), Mapping):
         path = f"{path_in_file}.measure"
-        convert_plain_data(values["measure"], _StoredMeasure, path)
+        convert_plain_data(values["measure"], _StoredMeasureDeclaration, path)
         given["measure"] = build_measure(values.pop("measure"), path)
-    made: Measure = build_from_plain_data(values, kind, path_in_file, given, _Count)
+    made: Measure = build_dataclass_from_plain_data(
+        values, kind, path_in_file, given, _BoundedInteger
+    )
     return made
 
 
-def build_reduction(plain_reduction: Mapping[str, Any], path_in_file: str) -> Reduction:
+def build_reduction(reduction_declaration: Mapping[str, Any], path_in_file: str) -> Reduction:
     """Build a reduction from its description.
 
     Parameters
@@ -351,13 +364,15 @@ def build_reduction(plain_reduction: Mapping[str, Any], path_in_file: str) -> Re
     DataError
         If a field is missing, unknown or invalid.
     """
-    values: dict[str, Any] = dict(plain_reduction)
-    kind = _find_class("reduction", Reduction, reductions, values.pop("kind"))
-    made: Reduction = build_from_plain_data(values, kind, path_in_file, integer_type=_Count)
+    values: dict[str, Any] = dict(reduction_declaration)
+    kind = _find_declared_class("reduction", Reduction, reductions, values.pop("kind"))
+    made: Reduction = build_dataclass_from_plain_data(
+        values, kind, path_in_file, integer_type=_BoundedInteger
+    )
     return made
 
 
-def _find_class(
+def _find_declared_class(
     declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
 ) -> Any:
     """Look up an rsfstudy class by its name in study declarations.
@@ -368,10 +383,10 @@ def _find_class(
     """
     for exported in exporting_package.__all__:
         getattr(exporting_package, exported)  # The attribute access loads the module of the class.
-    if declared_name not in _named_subclasses(base_class):
-        for study in study_names():
+    if declared_name not in _find_subclasses_by_declared_name(base_class):
+        for study in list_study_names():
             load_study(study)
-    kinds = _named_subclasses(base_class)
+    kinds = _find_subclasses_by_declared_name(base_class)
     if declared_name not in kinds:
         rule = "is not part of rsfstudy"
         raise InvalidValue(
@@ -380,11 +395,11 @@ def _find_class(
     return kinds[declared_name]
 
 
-def _named_subclasses(base_class: Any) -> dict[str, Any]:
+def _find_subclasses_by_declared_name(base_class: Any) -> dict[str, Any]:
     """Return the concrete subclasses in rsfstudy, keyed by their names in files."""
     found: dict[str, Any] = {}
     for kind in base_class.__subclasses__():
-        found |= _named_subclasses(kind)
+        found |= _find_subclasses_by_declared_name(kind)
         name = vars(kind).get("name") or vars(kind).get("kind")
         if name and kind.__module__.partition(".")[0] == __name__.partition(".")[0]:
             found[name] = kind

@@ -18,7 +18,7 @@ from typing import Any
 from rsfstudy.formatting import format_list
 
 #: Name of the entry that contains the code digests of modules.
-_MODULES = "physics"
+_CODE_DIGESTS_KEY = "physics"
 
 
 def find_fingerprint_differences(
@@ -43,16 +43,18 @@ def find_fingerprint_differences(
         (slider.friction)"``.
     """
     both: list[dict[str, Any]] = [json.loads(json.dumps(each)) for each in (first, second)]
-    codes = [each.get(_MODULES) for each in both]
+    codes = [each.get(_CODE_DIGESTS_KEY) for each in both]
     for fingerprint, code, other in zip(both, codes, reversed(codes), strict=True):
         if isinstance(code, dict) and isinstance(other, dict):
-            del fingerprint[_MODULES]
+            del fingerprint[_CODE_DIGESTS_KEY]
             names = sorted(name for name in code.keys() & other if code[name] != other[name])
             if names:
                 changed = {name: code[name] for name in names}
-                fingerprint[f"{_MODULES} ({format_list(names, ', ')})"] = _combine_digests(changed)
+                fingerprint[f"{_CODE_DIGESTS_KEY} ({format_list(names, ', ')})"] = (
+                    _combine_code_digests(changed)
+                )
         elif isinstance(code, dict):  # An older fingerprint contains one digest of all modules.
-            fingerprint[_MODULES] = _combine_digests(code)
+            fingerprint[_CODE_DIGESTS_KEY] = _combine_code_digests(code)
     first, second = both
     return {
         name: (first.get(name), second.get(name))
@@ -61,7 +63,9 @@ def find_fingerprint_differences(
     }
 
 
-def merge_fingerprints(stored: Mapping[str, Any], current: Mapping[str, Any]) -> dict[str, Any]:
+def merge_fingerprints(
+    stored_fingerprint: Mapping[str, Any], run_fingerprint: Mapping[str, Any]
+) -> dict[str, Any]:
     """Add the modules of the journal fingerprint to the fingerprint of a run.
 
     Parameters
@@ -74,13 +78,16 @@ def merge_fingerprints(stored: Mapping[str, Any], current: Mapping[str, Any]) ->
     dict of str to object
         Fingerprint of the run, with the code digests of all modules in both fingerprints.
     """
-    code, current_code = stored.get(_MODULES), current.get(_MODULES)
+    code, current_code = (
+        stored_fingerprint.get(_CODE_DIGESTS_KEY),
+        run_fingerprint.get(_CODE_DIGESTS_KEY),
+    )
     if not isinstance(code, dict) or not isinstance(current_code, dict):
-        return dict(current)
-    return {**current, _MODULES: {**code, **current_code}}
+        return dict(run_fingerprint)
+    return {**run_fingerprint, _CODE_DIGESTS_KEY: {**code, **current_code}}
 
 
-def _combine_digests(digests_by_module: Mapping[str, str]) -> str:
+def _combine_code_digests(digests_by_module: Mapping[str, str]) -> str:
     """Combine the code digests of several modules into one digest."""
     text = json.dumps(digests_by_module, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

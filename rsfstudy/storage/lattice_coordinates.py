@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes import Axis, AxisRow
+from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.quantities import Quantity
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.slider import Scene
@@ -35,19 +35,19 @@ def build_dimension_coordinates(study: Study) -> dict[str, np.ndarray]:
     dict of str to ndarray
         Labels, numbers or field values of the points of each axis, by name of the dimension.
     """
-    return {axis.dimension: _dimension_values(axis) for axis in study.axes}
+    return {axis.dimension: _build_dimension_coordinate(axis) for axis in study.axes}
 
 
-def _dimension_values(axis: Axis) -> np.ndarray:
+def _build_dimension_coordinate(axis: Axis) -> np.ndarray:
     """Return the labels, numbers or field values of the points of an axis."""
     if axis.labels is not None:
         return np.array(axis.labels, dtype=object)
     if axis.has_numbered_points:
         return np.arange(len(axis), dtype=np.int32)
-    return _to_storable_array([row.get(axis.dimension) for row in axis.rows])
+    return _convert_to_storable_array([row.get(axis.dimension) for row in axis.rows])
 
 
-class LatticeCoordinates:
+class LatticeCoordinatesBuilder:
     """Builder that derives the lattice coordinates from the scenes of a few cells.
 
     The coordinates include the dimension coordinates and the scene fields. A field that varies
@@ -74,12 +74,12 @@ class LatticeCoordinates:
         #: axis.
         self._representative_cells: list[list[int]] = []
         for axis, stride in zip(study.axes, strides, strict=True):
-            groups = axis.classify_rows()
+            groups = axis.group_rows_by_scene_parts()
             _, firsts, places = np.unique(groups, return_index=True, return_inverse=True)
             self._representative_cells.append((firsts[places] * stride).tolist())
         self.cell_numbers = frozenset(n for cells in self._representative_cells for n in cells)
 
-    def build(self, scenes: Mapping[int, Scene]) -> dict[Any, Any]:
+    def build_coordinates(self, scenes_by_cell_number: Mapping[int, Scene]) -> dict[Any, Any]:
         """Build the coordinates.
 
         Parameters
@@ -93,30 +93,38 @@ class LatticeCoordinates:
             Coordinates by name, in a form that ``xarray.Dataset`` accepts.
         """
         study, own, coords = self.study, self.study.quantities, dict[Any, Any]()
-        fields = {number: scene.as_dict() for number, scene in scenes.items()}
+        fields = {number: scene.as_dict() for number, scene in scenes_by_cell_number.items()}
         for axis, cells in zip(study.axes, self._representative_cells, strict=True):
-            coords |= _coordinates_of_axis(study, axis, [fields[number] for number in cells])
+            coords |= _build_coordinates_along_axis(
+                study, axis, [fields[number] for number in cells]
+            )
         for name, units in study.units.items():
             of_axis = {key: v for key, v in coords[name][2].items() if key != "scale"}
             coords[name] = (*coords[name][:2], of_axis | {"units": units})
-        scales = study.scene_builder.build_scale_coordinates() if study.scene_builder else {}
+        scales = (
+            study.axis_unit_converter.compute_scale_and_field_coordinates()
+            if study.axis_unit_converter
+            else {}
+        )
         for name, (dims, values) in scales.items():
-            about = variable_attributes(name.removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX), own)
+            about = build_variable_attributes(
+                name.removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX), own
+            )
             coords[name] = (dims, values, about)
-        stored = [scene.stored_fields() for scene in scenes.values()]
+        stored = [scene.stored_fields() for scene in scenes_by_cell_number.values()]
         for name in study.scene_fields:
             present = {scene.get(name) for scene in stored} - {None}
             if name not in {*coords, *study.measure.variables} and len(present) == 1:
                 value = present.pop()
-                about = variable_attributes(name, own, value)
-                coords[name] = ((), _to_storable_array([value])[0], about)
-        coords |= dict(_derived_coordinates(coords))
+                about = build_variable_attributes(name, own, value)
+                coords[name] = ((), _convert_to_storable_array([value])[0], about)
+        coords |= dict(_compute_derived_coordinates(coords))
         for name, values in study.measure.inner_coordinates.items():
-            coords[name] = (name, np.asarray(values), variable_attributes(name, own))
-        return coords | stored_loadings.loading_variables(study.user_parts.values())
+            coords[name] = (name, np.asarray(values), build_variable_attributes(name, own))
+        return coords | stored_loadings.build_loading_variables(study.user_parts.values())
 
 
-def _coordinates_of_axis(
+def _build_coordinates_along_axis(
     study: Study, axis: Axis, fields_of_points: list[dict[str, Any]]
 ) -> dict[str, Any]:
     """Build the dimension coordinate of an axis, and the coordinates of its fields."""
@@ -127,21 +135,23 @@ def _coordinates_of_axis(
         if axis.labels is None:
             about = {"units": "1", "long_name": f"number of the {words}"}
             about |= {"drawn": json.dumps(axis.sampling_info)} if axis.sampling_info else {}
-        coords[axis.dimension] = (axis.dimension, _dimension_values(axis), about)
+        coords[axis.dimension] = (axis.dimension, _build_dimension_coordinate(axis), about)
     # The coordinate contains the values of the axis, even if the scenes of the first cells do not
     # use these values.
-    points: list[AxisRow] = [
+    points: list[AxisPointFieldValues] = [
         {**study.measure.plain_fields, **fields, **row}
         for fields, row in zip(fields_of_points, axis.rows, strict=True)
     ]
     for name in axis.fields:
         varied = [point.get(name) for point in points]
-        about = variable_attributes(name, study.quantities, _first_value_not_none(varied))
-        coords[name] = (axis.dimension, _to_storable_array(varied), about)
+        about = build_variable_attributes(
+            name, study.quantities, _find_first_value_not_none(varied)
+        )
+        coords[name] = (axis.dimension, _convert_to_storable_array(varied), about)
     return coords
 
 
-def _derived_coordinates(coordinates: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
+def _compute_derived_coordinates(coordinates: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the coordinates that are computed from other coordinates."""
     for name, (source, formula) in FORMULAS_OF_DERIVED_COORDINATES.items():
         if source in coordinates:
@@ -149,29 +159,29 @@ def _derived_coordinates(coordinates: Mapping[Any, Any]) -> Iterator[tuple[str, 
             derived = [formula(value) for value in np.ravel(values).tolist()]
             yield (
                 name,
-                (dims, np.reshape(derived, np.shape(values)), variable_attributes(name, {})),
+                (dims, np.reshape(derived, np.shape(values)), build_variable_attributes(name, {})),
             )
 
 
-def _to_storable_array(values: list[Any]) -> np.ndarray:
+def _convert_to_storable_array(values: list[Any]) -> np.ndarray:
     """Convert the values of a field to an array that NetCDF can store.
 
     Strings are stored as an object array, and Boolean values as int8. All other values are stored
     as floats, and None is stored as NaN.
     """
-    if isinstance(_first_value_not_none(values), str):
+    if isinstance(_find_first_value_not_none(values), str):
         return np.array([value or "" for value in values], dtype=object)
-    if isinstance(_first_value_not_none(values), bool) and None not in values:
+    if isinstance(_find_first_value_not_none(values), bool) and None not in values:
         return np.array(values, dtype=np.int8)
     return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
-def _first_value_not_none(values: list[Any]) -> Any:
+def _find_first_value_not_none(values: list[Any]) -> Any:
     """Return the first value that is not None. If all values are None, return None."""
     return next((value for value in values if value is not None), None)
 
 
-def variable_attributes(
+def build_variable_attributes(
     variable_name: str, study_quantities: Mapping[str, Quantity], example_value: Any = None
 ) -> dict[str, Any]:
     """Build the attributes of a variable.

@@ -16,8 +16,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.status import Status
-from rsfstudy.storage.cell_columns import CellColumns, OutputPacker
-from rsfstudy.storage.lattice_coordinates import variable_attributes
+from rsfstudy.storage.cell_columns import CellOutputPacker, CellResultArrays
+from rsfstudy.storage.lattice_coordinates import build_variable_attributes
 from rsfstudy.storage.schema import FILE_LAYOUT_VERSION
 from rsfstudy.study import Study
 from rsfstudy.vocabulary import find_coverage_content_type
@@ -33,7 +33,7 @@ _COMMENT_ON_RIG_UNITS = (
 )
 #: Names of the root attributes that users can set with environment variables. For example, the
 #: variable ``RSFSTUDY_LICENSE`` sets the attribute ``license``.
-_CREDIT_ATTRIBUTES_FROM_ENVIRONMENT = (
+_ROOT_ATTRIBUTES_FROM_ENVIRONMENT = (
     "creator_name",
     "creator_email",
     "institution",
@@ -42,10 +42,10 @@ _CREDIT_ATTRIBUTES_FROM_ENVIRONMENT = (
 )
 
 
-def assemble_dataset(
+def assemble_study_dataset(
     study: Study,
     coordinates: Mapping[Any, Any],
-    cell_columns: CellColumns,
+    cell_arrays: CellResultArrays,
     provenance: Mapping[str, Any],
 ) -> xr.Dataset:
     """Assemble the dataset of a study.
@@ -66,13 +66,13 @@ def assemble_dataset(
     xarray.Dataset
         Dataset with one value per cell and output, before any reductions.
     """
-    dataset = xr.Dataset(build_lattice_variables(study, cell_columns, study.shape), coordinates)
-    known = int((cell_columns.statuses != int(Status.PENDING)).sum())
-    return dataset.assign_attrs(root_attributes(study, known, provenance))
+    dataset = xr.Dataset(build_lattice_variables(study, cell_arrays, study.shape), coordinates)
+    known = int((cell_arrays.statuses != int(Status.PENDING)).sum())
+    return dataset.assign_attrs(build_root_attributes(study, known, provenance))
 
 
 def build_lattice_variables(
-    study: Study, cell_columns: CellColumns, block_shape: tuple[int, ...]
+    study: Study, cell_arrays: CellResultArrays, block_shape: tuple[int, ...]
 ) -> dict[Any, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Build the dataset variables for a block of cells.
 
@@ -93,21 +93,21 @@ def build_lattice_variables(
     dict of str to tuple
         Dimensions, values and attributes of each variable.
     """
-    layout, dims, own = OutputPacker(study.measure), study.dimensions, study.quantities
+    layout, dims, own = CellOutputPacker(study.measure), study.dimensions, study.quantities
     described = {}
     for name, inner in study.measure.variables.items():
-        values = cell_columns.packed_outputs[:, layout.slices[name]].reshape(
+        values = cell_arrays.packed_outputs[:, layout.slices[name]].reshape(
             block_shape + layout.shapes[name]
         )
-        described[name] = ((*dims, *inner), values, variable_attributes(name, own))
+        described[name] = ((*dims, *inner), values, build_variable_attributes(name, own))
     kept = {
-        "status": cell_columns.statuses,
-        "rhs_evaluations": cell_columns.rhs_evaluations,
-        "wall_time": cell_columns.wall_times,
-        "message": cell_columns.messages,
+        "status": cell_arrays.statuses,
+        "rhs_evaluations": cell_arrays.rhs_evaluations,
+        "wall_time": cell_arrays.wall_times,
+        "message": cell_arrays.messages,
     }
     for name, values in kept.items():
-        described[name] = (dims, values.reshape(block_shape), variable_attributes(name, {}))
+        described[name] = (dims, values.reshape(block_shape), build_variable_attributes(name, {}))
     described["status"][2].update(
         flag_values=np.array([int(s) for s in Status], dtype=np.int8),
         flag_meanings=" ".join(s.label for s in Status),
@@ -121,7 +121,7 @@ def build_lattice_variables(
     return described
 
 
-def root_attributes(
+def build_root_attributes(
     study: Study, finished_cell_count: int, provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Build the root attributes of a dataset.
@@ -167,7 +167,7 @@ def root_attributes(
         "provenance": json.dumps(dict(provenance)),
         **{
             name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated")
-            for name in _CREDIT_ATTRIBUTES_FROM_ENVIRONMENT
+            for name in _ROOT_ATTRIBUTES_FROM_ENVIRONMENT
         },
     }
     # The command line and environment variables may contain bytes that are not valid text.

@@ -21,7 +21,7 @@ import msgspec
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
 
 
-def invalid_part_error(path_in_file: str, reason: str) -> DataError:
+def build_invalid_entry_error(path_in_file: str, reason: str) -> DataError:
     """Build the error for an invalid entry of a results file.
 
     Parameters
@@ -74,12 +74,12 @@ def convert_plain_data(plain_data: Any, annotated_type: Any, path_in_file: str) 
         )
         if field := re.fullmatch("Object .* (required|unknown) field `(.*)`", why):
             rule = "is missing" if field[1] == "required" else "is unknown"
-            raise invalid_part_error(f"{place}.{field[2]}", rule) from error
-        raise invalid_part_error(place, f"is invalid ({shorten_text(why)})") from error
+            raise build_invalid_entry_error(f"{place}.{field[2]}", rule) from error
+        raise build_invalid_entry_error(place, f"is invalid ({shorten_text(why)})") from error
 
 
 @cache
-def struct_of_fields(name: str, type_by_field: tuple[tuple[str, Any], ...]) -> Any:
+def create_struct_type(name: str, type_by_field: tuple[tuple[str, Any], ...]) -> Any:
     """Create a struct that has only required fields and rejects unknown fields.
 
     Parameters
@@ -97,7 +97,7 @@ def struct_of_fields(name: str, type_by_field: tuple[tuple[str, Any], ...]) -> A
     return msgspec.defstruct(name, type_by_field, forbid_unknown_fields=True)
 
 
-def build_from_plain_data(
+def build_dataclass_from_plain_data(
     plain_data: Any,
     dataclass_type: Any,
     path_in_file: str,
@@ -135,11 +135,11 @@ def build_from_plain_data(
         for field in fields(dataclass_type)
         if field.name not in given_fields
     )
-    values = convert_fields(plain_data, types, path_in_file)
-    return call_with_fields(dataclass_type, {**values, **given_fields}, path_in_file)
+    values = convert_plain_field_values(plain_data, types, path_in_file)
+    return construct_from_field_values(dataclass_type, {**values, **given_fields}, path_in_file)
 
 
-def convert_fields(
+def convert_plain_field_values(
     plain_data: Any, type_by_field: tuple[tuple[str, Any], ...], path_in_file: str
 ) -> dict[str, Any]:
     """Convert the values of a mapping to the types of its fields.
@@ -163,11 +163,13 @@ def convert_fields(
     DataError
         If a field is missing, unknown or invalid.
     """
-    struct = struct_of_fields("Stored", type_by_field)
+    struct = create_struct_type("Stored", type_by_field)
     return msgspec.structs.asdict(convert_plain_data(plain_data, struct, path_in_file))
 
 
-def call_with_fields(constructor: Any, values: Mapping[str, Any], path_in_file: str) -> Any:
+def construct_from_field_values(
+    constructor: Any, field_values: Mapping[str, Any], path_in_file: str
+) -> Any:
     """Call a constructor, and add the location in the file to its error messages.
 
     Parameters
@@ -190,6 +192,8 @@ def call_with_fields(constructor: Any, values: Mapping[str, Any], path_in_file: 
         If the constructor rejects a value. The message contains the path of the value.
     """
     try:
-        return constructor(**values)
+        return constructor(**field_values)
     except InvalidValue as error:
-        raise invalid_part_error(f"{path_in_file}.{error.name}", f"is invalid ({error})") from error
+        raise build_invalid_entry_error(
+            f"{path_in_file}.{error.name}", f"is invalid ({error})"
+        ) from error

@@ -18,16 +18,16 @@ from rsfstudy.slider import SceneFields, UserPart
 from rsfstudy.storage import schema, stored_loadings
 from rsfstudy.storage.declarations import (
     MISSING_STUDY_FILE_REMEDY,
-    StoredDeclaration,
+    StoredStudyDeclaration,
     build_measure,
     build_reduction,
     build_rig,
-    build_scene_from_stored,
+    build_scene_from_stored_fields,
     find_user_part_missing_from_file,
 )
 from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
-from rsfstudy.storage.plain_data import invalid_part_error
-from rsfstudy.study import Study, load_study, study_names
+from rsfstudy.storage.plain_data import build_invalid_entry_error
+from rsfstudy.study import Study, list_study_names, load_study
 from rsfstudy.vocabulary import find_coverage_content_type
 
 
@@ -58,22 +58,22 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
     DataError
         If the declaration is invalid, or if the axes of the results do not match the declaration.
     """
-    declared = schema.read_declaration(results)
+    declared = schema.read_study_declaration(results)
     if (
         study_file is None
-        and declared.name in study_names()
+        and declared.name in list_study_names()
         and find_user_part_missing_from_file(declared)
     ):
         study_file = declared.name
     for axis in declared.axes:
         points = results.sizes.get(axis.dimension)
-        declared_points = len(axis.build())
+        declared_points = len(axis.build_axis())
         if declared_points != points:
             rule = (
                 f"has {declared_points} points in the declaration, but {points} points in the file"
             )
-            raise invalid_part_error(axis.dimension, rule)
-    held = stored_loadings.read_loadings(results)
+            raise build_invalid_entry_error(axis.dimension, rule)
+    held = stored_loadings.read_user_loadings(results)
     if study_file is None and depends_on_user_code(results):
         rule = "is user-defined, and code is never loaded from a results file"
         remedy, named_in = (
@@ -94,12 +94,12 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
             f"{declared.name!r}"
         )
         raise InvalidValue("study", str(study_file), rule)
-    study = study_from_declaration(declared, held, named)
-    _check_axes(study, results)
+    study = build_study_from_declaration(declared, held, named)
+    _check_axes_match_results(study, results)
     return study
 
 
-def study_of_dataset(results: xr.Dataset) -> Study:
+def rebuild_study_without_user_code(results: xr.Dataset) -> Study:
     """Rebuild the study that produced a dataset, with all of its cells.
 
     The rebuilt study contains all cells, even if the dataset is a selection of cells.
@@ -121,12 +121,12 @@ def study_of_dataset(results: xr.Dataset) -> Study:
     DataError
         If the declaration is invalid.
     """
-    declared, about = schema.read_declaration(results), schema.read_provenance(results)
+    declared, about = schema.read_study_declaration(results), schema.read_provenance(results)
     if depends_on_user_code(results):
         rule = "contains user-defined code, and code is never loaded from a dataset"
         remedy = f"Import the study from the file that declares the study. {about['declared_in']}"
         raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
-    return study_from_declaration(declared, stored_loadings.read_loadings(results))
+    return build_study_from_declaration(declared, stored_loadings.read_user_loadings(results))
 
 
 def depends_on_user_code(results: xr.Dataset) -> bool:
@@ -148,27 +148,28 @@ def depends_on_user_code(results: xr.Dataset) -> bool:
     """
     if schema.read_provenance(results)["fingerprint"]["own_code"] == "none":
         return False
-    held = stored_loadings.read_loadings(results)
+    held = stored_loadings.read_user_loadings(results)
     return (
         not held
-        or find_user_part_missing_from_file(schema.read_declaration(results), held) is not None
+        or find_user_part_missing_from_file(schema.read_study_declaration(results), held)
+        is not None
     )
 
 
-def _check_axes(study: Study, results: xr.Dataset) -> None:
+def _check_axes_match_results(study: Study, results: xr.Dataset) -> None:
     """Check that the axes of the results match the declaration."""
     dims = results["status"].dims
     if dims != study.dimensions:
-        raise invalid_part_error(
+        raise build_invalid_entry_error(
             "status", f"has the dimensions {dims}, which differ from the axes of the declaration"
         )
     for name, values in build_dimension_coordinates(study).items():
         if values.tolist() != results[name].values.tolist():
-            raise invalid_part_error(name, "differs from the axis in the declaration")
+            raise build_invalid_entry_error(name, "differs from the axis in the declaration")
 
 
-def study_from_declaration(
-    declaration: StoredDeclaration,
+def build_study_from_declaration(
+    declaration: StoredStudyDeclaration,
     stored_loadings: Mapping[str, UserPart],
     study_with_user_code: Study | None = None,
 ) -> Study:
@@ -199,7 +200,7 @@ def study_from_declaration(
     """
     parts = msgspec.structs.asdict(declaration)
     own = {**_collect_known_user_parts(study_with_user_code), **stored_loadings}
-    parts["base"] = build_scene_from_stored(declaration.base, own)
+    parts["base"] = build_scene_from_stored_fields(declaration.base, own)
     if study_with_user_code is None:
         parts["measure"] = build_measure(declaration.measure, "declaration.measure")
         parts["reductions"] = [
@@ -213,22 +214,24 @@ def study_from_declaration(
         stated = {name: v for name, v in declaration.measure.items() if name in kind.plain_fields}
         parts["measure"] = kind.with_(**stated)
     try:
-        parts["axes"] = [axis.build(own) for axis in declaration.axes]
+        parts["axes"] = [axis.build_axis(own) for axis in declaration.axes]
         del parts["laboratory"]
         if declaration.laboratory is not None:
             parts["rig"] = build_rig(declaration.laboratory)
         return Study(**parts)
     except InvalidValue as error:
-        raise invalid_part_error("declaration", f"is not a valid study ({error})") from error
+        raise build_invalid_entry_error("declaration", f"is not a valid study ({error})") from error
 
 
 def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
     """Return the user-defined parts of a study and all other registered parts."""
-    others = {name: part for slot in SceneFields.SLOTS for name, part in slot.user_parts.items()}
+    others = {
+        name: part for slot in SceneFields.PART_SLOTS for name, part in slot.user_parts.items()
+    }
     return {} if study is None else {**others, **study.user_parts}
 
 
-def find_primary_output(dataset: xr.Dataset) -> str | None:
+def find_primary_output_name(dataset: xr.Dataset) -> str | None:
     """Find the name of the primary output of a dataset.
 
     The primary output is the output that the measure declares as its main result. If rsfstudy has
@@ -255,7 +258,7 @@ def find_primary_output(dataset: xr.Dataset) -> str | None:
         and find_coverage_content_type(str(name)) == "modelResult"
     ]
     try:
-        described = schema.read_declaration(dataset).measure
+        described = schema.read_study_declaration(dataset).measure
         stated = build_measure(described, "declaration.measure").primary_output
     except (DataError, InvalidValue):
         stated = ""

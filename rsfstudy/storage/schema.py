@@ -17,11 +17,11 @@ import xarray as xr
 from rsfstudy.errors import DataError, shorten_text
 from rsfstudy.status import Status
 from rsfstudy.storage.declarations import (
-    StoredDeclaration,
-    build_scene_from_stored,
-    parse_declaration,
+    StoredStudyDeclaration,
+    build_scene_from_stored_fields,
+    parse_study_declaration,
 )
-from rsfstudy.storage.plain_data import convert_plain_data, invalid_part_error
+from rsfstudy.storage.plain_data import build_invalid_entry_error, convert_plain_data
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 #: Version of the file layout. A file without a version number has layout 1. In layout 1, the digest
@@ -52,7 +52,7 @@ class RootAttributes(TypedDict):
     reduced_despite: str
 
 
-class StoredFingerprint(TypedDict):
+class StoredRunFingerprint(TypedDict):
     """Code digests and versions that affect the results.
 
     The struct does not declare types for the other entries of a fingerprint, because these entries
@@ -87,14 +87,14 @@ class StoredProvenance(TypedDict):
     command: str
     declared_in: str
     versions: Mapping[str, str]
-    fingerprint: StoredFingerprint
+    fingerprint: StoredRunFingerprint
     git: str
     machine: str
 
 
 #: NumPy dtype kinds that variables may have, and a description of these kinds for error messages.
 _ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or strings")
-_REQUIRED_VARIABLES = {
+_DTYPE_KINDS_OF_REQUIRED_VARIABLES = {
     "status": ("i", "whole numbers"),
     "message": ("OUT", "strings"),
     "rhs_evaluations": ("iu", "whole numbers"),
@@ -102,7 +102,7 @@ _REQUIRED_VARIABLES = {
 }
 
 
-def check_results(dataset: xr.Dataset) -> None:
+def check_results_dataset(dataset: xr.Dataset) -> None:
     """Check all entries of a results file that rsfstudy uses.
 
     Parameters
@@ -123,18 +123,18 @@ def check_results(dataset: xr.Dataset) -> None:
             "attribute source."
         )
     attrs = convert_plain_data({"reduced_despite": "", **dataset.attrs}, RootAttributes, "")
-    name = read_declaration(dataset).name
+    name = read_study_declaration(dataset).name
     if attrs["id"] != name or not name.isidentifier():
-        raise invalid_part_error(
+        raise build_invalid_entry_error(
             "id",
             f"is {shorten_text(attrs['id'])!r}, but the declared study is {shorten_text(name)!r}",
         )
-    for variable in _REQUIRED_VARIABLES:
+    for variable in _DTYPE_KINDS_OF_REQUIRED_VARIABLES:
         if variable not in dataset.data_vars:
-            raise invalid_part_error(variable, "is missing")
+            raise build_invalid_entry_error(variable, "is missing")
         if dataset[variable].dims != dataset["status"].dims:
             dims = dataset[variable].dims
-            raise invalid_part_error(
+            raise build_invalid_entry_error(
                 variable,
                 f"has the dimensions {dims}, but status has the dimensions "
                 f"{dataset['status'].dims}",
@@ -144,12 +144,12 @@ def check_results(dataset: xr.Dataset) -> None:
             _check_dtype_kind(str(key), values)
     for name in map(str, dataset["status"].dims):
         if name not in dataset.coords or dataset[name].dims != (name,):
-            raise invalid_part_error(name, "is not a dimension coordinate")
+            raise build_invalid_entry_error(name, "is not a dimension coordinate")
         if not dataset.indexes[name].is_unique:
-            raise invalid_part_error(name, "has the same value more than once")
+            raise build_invalid_entry_error(name, "has the same value more than once")
     unknown = np.setdiff1d(dataset["status"].values, [int(status) for status in Status])
     if unknown.size:
-        raise invalid_part_error(
+        raise build_invalid_entry_error(
             "status", f"is {unknown[0]} in a cell, which is not the code of a status"
         )
 
@@ -194,7 +194,7 @@ def check_contains_study_results(dataset: xr.Dataset, file_description: str) -> 
         )
 
 
-def read_declaration(dataset: xr.Dataset) -> StoredDeclaration:
+def read_study_declaration(dataset: xr.Dataset) -> StoredStudyDeclaration:
     """Read the declaration of the study that produced a dataset.
 
     Parameters
@@ -212,9 +212,9 @@ def read_declaration(dataset: xr.Dataset) -> StoredDeclaration:
     DataError
         If the declaration is missing or invalid.
     """
-    declared = parse_declaration(read_json_attribute(dataset, "declaration"))
+    declared = parse_study_declaration(read_json_attribute(dataset, "declaration"))
     if read_provenance(dataset)["fingerprint"]["own_code"] == "none":
-        build_scene_from_stored(declared.base)
+        build_scene_from_stored_fields(declared.base)
     return declared
 
 
@@ -285,22 +285,24 @@ def read_json_attribute(dataset: xr.Dataset, attribute_name: str) -> Any:
         If the attribute is missing or is not valid JSON.
     """
     if attribute_name not in dataset.attrs:
-        raise invalid_part_error(attribute_name, "is missing")
+        raise build_invalid_entry_error(attribute_name, "is missing")
     try:
         return json.loads(dataset.attrs[attribute_name])
     except (TypeError, ValueError, RecursionError) as error:
-        raise invalid_part_error(
+        raise build_invalid_entry_error(
             attribute_name, f"is not valid JSON ({shorten_text(error)})"
         ) from error
 
 
 def _check_dtype_kind(variable_name: str, values: xr.Variable) -> None:
     """Raise ``DataError`` if a variable has the wrong kind of dtype."""
-    kinds, wanted = _REQUIRED_VARIABLES.get(variable_name, _ALLOWED_DTYPE_KINDS)
+    kinds, wanted = _DTYPE_KINDS_OF_REQUIRED_VARIABLES.get(variable_name, _ALLOWED_DTYPE_KINDS)
     kind = values.dtype.kind
     if kind not in kinds:
-        raise invalid_part_error(
+        raise build_invalid_entry_error(
             variable_name, f"contains {values.dtype}, but must contain {wanted}"
         )
     if kind == "O" and not all(isinstance(text, str) for text in values.values.flat):
-        raise invalid_part_error(variable_name, f"contains objects, but must contain {wanted}")
+        raise build_invalid_entry_error(
+            variable_name, f"contains objects, but must contain {wanted}"
+        )

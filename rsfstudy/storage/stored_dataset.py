@@ -10,7 +10,7 @@ import xarray as xr
 
 from rsfstudy.slider import Scene
 from rsfstudy.storage import dataset_scenes, rebuild_from_file, schema
-from rsfstudy.storage.declarations import StoredDeclaration
+from rsfstudy.storage.declarations import StoredStudyDeclaration
 from rsfstudy.storage.schema import StoredProvenance
 from rsfstudy.study import Study
 
@@ -36,9 +36,9 @@ class StoredDataset:
         return schema.is_of_single_scene(self.dataset)
 
     @property
-    def declaration(self) -> StoredDeclaration:
+    def declaration(self) -> StoredStudyDeclaration:
         """Declaration of the study."""
-        return schema.read_declaration(self.dataset)
+        return schema.read_study_declaration(self.dataset)
 
     @property
     def provenance(self) -> StoredProvenance:
@@ -53,12 +53,12 @@ class StoredDataset:
     @property
     def study(self) -> Study:
         """Complete study, even if the dataset contains only a selection of its cells."""
-        return rebuild_from_file.study_of_dataset(self.dataset)
+        return rebuild_from_file.rebuild_study_without_user_code(self.dataset)
 
     @property
-    def primary_output(self) -> str | None:
+    def primary_output_name(self) -> str | None:
         """Name of the primary output, or None if no output is numeric."""
-        return rebuild_from_file.find_primary_output(self.dataset)
+        return rebuild_from_file.find_primary_output_name(self.dataset)
 
     def rebuild_study(self, study_file: str | Path | None = None) -> Study:
         """Rebuild the study of the results from its declaration.
@@ -75,7 +75,7 @@ class StoredDataset:
         """
         return rebuild_from_file.rebuild_study(self.dataset, study_file)
 
-    def find_scene(self, study: Study | None) -> Scene:
+    def rebuild_scene(self, study: Study | None) -> Scene:
         """Return the scene of the dataset, or of the selected cell of a study.
 
         Parameters
@@ -88,9 +88,9 @@ class StoredDataset:
         Scene
             Scene of the dataset.
         """
-        return dataset_scenes.scene_of_dataset(self.dataset, study)
+        return dataset_scenes.rebuild_scene(self.dataset, study)
 
-    def read_json(self, attribute_name: str) -> Any:
+    def read_json_attribute(self, attribute_name: str) -> Any:
         """Decode a root attribute that contains JSON.
 
         Parameters
@@ -105,7 +105,7 @@ class StoredDataset:
         """
         return schema.read_json_attribute(self.dataset, attribute_name)
 
-    def check_contains_study_results(self, description: str) -> None:
+    def check_contains_study_results(self, file_description: str) -> None:
         """Raise ``DataError`` if the dataset does not contain the results of a study.
 
         Parameters
@@ -113,4 +113,4 @@ class StoredDataset:
         description : str
             Description of the file or dataset for the error message.
         """
-        schema.check_contains_study_results(self.dataset, description)
+        schema.check_contains_study_results(self.dataset, file_description)

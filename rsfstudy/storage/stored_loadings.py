@@ -13,24 +13,24 @@ import xarray as xr
 
 from rsfstudy.parts import Segment
 from rsfstudy.slider import Protocol, SampledHistory, UserLoading, UserPart, protocol
-from rsfstudy.storage.plain_data import invalid_part_error
+from rsfstudy.storage.plain_data import build_invalid_entry_error
 
 #: Dimension name of the rows, and description of the columns, for each kind of loading table.
-_DESCRIPTION_OF_SAMPLE_ROWS = (
+_SAMPLE_DIMENSION_AND_COLUMNS = (
     "sample",
     "time, load point velocity, decrease of normal stress, and rate of normal stress",
 )
-_DESCRIPTION_OF_SEGMENT_ROWS = (
+_SEGMENT_DIMENSION_AND_COLUMNS = (
     "segment",
     "load point velocity, displacement step, duration, and normal stress minus sigma_star",
 )
 
 #: Names of the attributes that show whether a sampled history imposes velocity, normal stress or
 #: pore pressure.
-_FLAGS_OF_SAMPLED_HISTORIES = ("of_stress", "of_pressure")
+_FLAG_ATTRIBUTES_OF_SAMPLED_HISTORIES = ("of_stress", "of_pressure")
 
 
-def loading_variables(user_parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
+def build_loading_variables(user_parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
     """Build the variables that contain user-defined loadings.
 
     Parameters
@@ -46,9 +46,9 @@ def loading_variables(user_parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
     found = {}
     for part in user_parts:
         if isinstance(part, SampledHistory):
-            (row, columns), rows = _DESCRIPTION_OF_SAMPLE_ROWS, part.sample_table
+            (row, columns), rows = _SAMPLE_DIMENSION_AND_COLUMNS, part.sample_table
         elif isinstance(part, Protocol):
-            (row, columns), rows = _DESCRIPTION_OF_SEGMENT_ROWS, np.array(part.input_segments)
+            (row, columns), rows = _SEGMENT_DIMENSION_AND_COLUMNS, np.array(part.input_segments)
         else:
             continue
         about: dict[str, Any] = {
@@ -58,13 +58,15 @@ def loading_variables(user_parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
             "coverage_content_type": "auxiliaryInformation",
         }
         if isinstance(part, SampledHistory):
-            about |= {name: int(getattr(part, name)) for name in _FLAGS_OF_SAMPLED_HISTORIES}
+            about |= {
+                name: int(getattr(part, name)) for name in _FLAG_ATTRIBUTES_OF_SAMPLED_HISTORIES
+            }
         dims = (f"{part.name}_{row}", f"{part.name}_column")
         found[f"{part.name}_{row}s"] = xr.Variable(dims, rows, about)
     return found
 
 
-def read_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
+def read_user_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
     """Read the user-defined loadings from a dataset.
 
     Parameters
@@ -90,14 +92,17 @@ def read_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
         if (
             values.dtype.kind != "f"
             or values.ndim != 2
-            or values.shape[1] != SampledHistory.COLUMN_COUNT
+            or values.shape[1] != SampledHistory.SAMPLE_TABLE_COLUMN_COUNT
         ):
-            raise invalid_part_error(
+            raise build_invalid_entry_error(
                 str(key),
-                f"is not the table of a loading with {SampledHistory.COLUMN_COUNT} columns",
+                f"is not the table of a loading with {SampledHistory.SAMPLE_TABLE_COLUMN_COUNT} columns",
             )
         if "of_stress" in values.attrs:
-            of = {key: bool(values.attrs.get(key, False)) for key in _FLAGS_OF_SAMPLED_HISTORIES}
+            of = {
+                key: bool(values.attrs.get(key, False))
+                for key in _FLAG_ATTRIBUTES_OF_SAMPLED_HISTORIES
+            }
             found[name] = SampledHistory.from_table(values.values, name=name, **of)
         else:
             found[name] = protocol([Segment(*row) for row in values.values.tolist()], name)

@@ -21,11 +21,15 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.status import Status
-from rsfstudy.storage.cell_columns import CellColumns, OutputPacker
-from rsfstudy.storage.dataset_files import ZARR_OPEN_OPTIONS, open_zarr_store, write_store_digest
+from rsfstudy.storage.cell_columns import CellOutputPacker, CellResultArrays
+from rsfstudy.storage.dataset_files import (
+    ZARR_OPEN_OPTIONS,
+    open_zarr_store,
+    write_zarr_store_digest,
+)
 from rsfstudy.storage.lattice_datasets import (
     build_lattice_variables,
-    root_attributes,
+    build_root_attributes,
 )
 from rsfstudy.study import Study
 
@@ -37,8 +41,8 @@ _MAX_VALUES_PER_SLAB = 4_000_000
 _ZARR_WRITE_OPTIONS: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
 #: Function that reads a slice of the cells, in row-major order.
-ReadCellsFunction = Callable[[slice], CellColumns]
-ReduceLatticeFunction = Callable[[xr.Dataset], xr.Dataset]
+ReadCellsFunction = Callable[[slice], CellResultArrays]
+ApplyReductionsFunction = Callable[[xr.Dataset], xr.Dataset]
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class ZarrStore:
     path: Path
 
     @staticmethod
-    def check_installed() -> None:
+    def check_zarr_is_installed() -> None:
         """Check that the package zarr is installed.
 
         Raises
@@ -82,13 +86,13 @@ class ZarrStore:
                 "that have opened it. Move the store, or choose another --output."
             )
 
-    def write(
+    def write_study_results(
         self,
         study: Study,
         coordinates: Mapping[Any, Any],
         read_cells: ReadCellsFunction,
         provenance: Mapping[str, Any],
-        apply_reductions: ReduceLatticeFunction,
+        apply_reductions: ApplyReductionsFunction,
     ) -> xr.Dataset:
         """Write the lattice of a study and its reductions to a Zarr store.
 
@@ -120,19 +124,19 @@ class ZarrStore:
         beside = path.with_name(f".{path.name}.new")
         try:
             shutil.rmtree(beside, ignore_errors=True)
-            finished = _write_lattice(study, coordinates, read_cells, beside)
+            finished = _write_lattice_in_slabs(study, coordinates, read_cells, beside)
             lattice = open_zarr_store(beside)
             results = apply_reductions(lattice)
             reductions = _convert_strings_to_object_dtype(
                 results.drop_vars(list(lattice.variables))
             )
-            about = {**root_attributes(study, finished, provenance), **results.attrs}
+            about = {**build_root_attributes(study, finished, provenance), **results.attrs}
             with warnings.catch_warnings():
                 # Version 3 of the Zarr format does not specify consolidated metadata yet, but
                 # xarray looks for them.
                 warnings.filterwarnings("ignore", "Consolidated metadata")
                 reductions.assign_attrs(about).to_zarr(beside, mode="a", zarr_format=3)
-            write_store_digest(beside)
+            write_zarr_store_digest(beside)
             beside.rename(path)
         except OSError as error:
             raise DataError(f"cannot write {path}: {error}.") from error
@@ -150,12 +154,12 @@ def _convert_strings_to_object_dtype(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(texts).set_coords([name for name in texts if name in dataset.coords])
 
 
-def _write_lattice(
+def _write_lattice_in_slabs(
     study: Study, coordinates: Mapping[Any, Any], read_cells: ReadCellsFunction, path: Path
 ) -> int:
     """Write the variables of the lattice, and count the finished cells."""
     width, first, finished = (
-        OutputPacker(study.measure).packed_number_count,
+        CellOutputPacker(study.measure).packed_number_count,
         study.dimensions[0],
         0,
     )
@@ -166,7 +170,7 @@ def _write_lattice(
     # The fill values are the values of pending cells. If a chunk is lost, its cells are therefore
     # read as pending cells.
     pending = build_lattice_variables(
-        study, CellColumns.build_pending_cells(1, width), (1,) * len(study.shape)
+        study, CellResultArrays.build_for_pending_cells(1, width), (1,) * len(study.shape)
     )
     encoding = {
         name: {"chunks": (rows, *within, *v.shape[len(study.shape) :]), "fill_value": v.flat[0]}

@@ -22,14 +22,21 @@ if TYPE_CHECKING:
         Figure,
         Panel,
     )
-    from rsfstudy.study.lattice_cell import Cell, CellChanges
-    from rsfstudy.study.reductions.base import failed_cell_mask, read_quantities_not_in_vocabulary
+    from rsfstudy.study.lattice_cell import Cell, CellFieldChanges
+    from rsfstudy.study.reductions.base import (
+        is_failed_or_pending,
+        read_quantities_not_in_vocabulary,
+    )
     from rsfstudy.study.studies_on_rig import convert_study_to_rig_units
     from rsfstudy.study.study import Study
-    from rsfstudy.study.study_index import STUDIES_PACKAGE, study_names, study_titles
+    from rsfstudy.study.study_index import (
+        NAMED_STUDIES_PACKAGE,
+        list_study_names,
+        read_study_titles,
+    )
     from rsfstudy.study.study_loader import load_study
-    from rsfstudy.study.user_parts import find_named_user_parts
-    from rsfstudy.study.verdict_table import format_verdict_row
+    from rsfstudy.study.user_parts import find_user_parts_in_axis_rows
+    from rsfstudy.study.verdict_table import format_verdict_row_for_report
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -56,20 +63,20 @@ else:
 
 __all__ = [
     "Cell",
-    "CellChanges",
+    "CellFieldChanges",
     "Claim",
     "DrawFunction",
     "Figure",
     "Panel",
-    "STUDIES_PACKAGE",
+    "NAMED_STUDIES_PACKAGE",
     "Study",
     "build_verdict_table",
-    "find_named_user_parts",
-    "format_verdict_row",
-    "failed_cell_mask",
+    "find_user_parts_in_axis_rows",
+    "format_verdict_row_for_report",
+    "is_failed_or_pending",
     "load_study",
     "read_quantities_not_in_vocabulary",
-    "study_names",
-    "study_titles",
+    "list_study_names",
+    "read_study_titles",
     "convert_study_to_rig_units",
 ]

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Sequence
 from functools import partial
 from typing import Any
 
-from rsfstudy.axes import Axis, AxisRow
+from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 
@@ -33,7 +33,9 @@ def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
     InvalidValue
         If a selected point does not exist on the axis.
     """
-    rows: dict[Any, AxisRow] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
+    rows: dict[Any, AxisPointFieldValues] = dict(
+        zip(axis.labels or range(len(axis)), axis.rows, strict=True)
+    )
     for point in labels_or_numbers:
         if point not in rows:
             rule, choices = "is not a point of the axis", axis.labels or ()
@@ -49,7 +51,7 @@ def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
     return axis.with_rows([rows[number] for number in labels_or_numbers], axis.units, drawn)
 
 
-def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> Axis:
+def replace_field_values(axis: Axis, field_name: str, new_values: Sequence[Any]) -> Axis:
     """Replace the values of one field of a zipped or numbered axis.
 
     Parameters
@@ -75,32 +77,39 @@ def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> 
         If a numbered axis receives several values, or if a value is not hashable.
     """
     if axis.has_numbered_points:
-        if len(values) != 1:
+        if len(new_values) != 1:
             rule = (
                 f"varies along the axis {axis.dimension}, so an override must be a single "
                 "value for all points"
             )
-            raise InvalidValue(field_name, values, rule, remedy="Pass a single value.")
-        return axis.with_rows([{**row, field_name: values[0]} for row in axis.rows], axis.units)
+            raise InvalidValue(field_name, new_values, rule, remedy="Pass a single value.")
+        return axis.with_rows([{**row, field_name: new_values[0]} for row in axis.rows], axis.units)
     assert axis.labels is not None
-    for value in values:
+    for value in new_values:
         if not isinstance(value, Hashable):
             rule = "must be a number, a string, True, False or a part"
             raise InvalidValue(
                 field_name, value, rule, remedy=f"Write {field_name}=[first, second]."
             )
-    existing = {_point_key(row): label for label, row in zip(axis.labels, axis.rows, strict=True)}
-    others = {_point_key({**row, field_name: None}) for row in axis.rows if field_name in row}
-    points: dict[str, AxisRow] = {}
+    existing = {
+        _convert_row_to_hashable_key(row): label
+        for label, row in zip(axis.labels, axis.rows, strict=True)
+    }
+    others = {
+        _convert_row_to_hashable_key({**row, field_name: None})
+        for row in axis.rows
+        if field_name in row
+    }
+    points: dict[str, AxisPointFieldValues] = {}
     for label, row in zip(axis.labels, axis.rows, strict=True):
         if field_name not in row:
             points[label] = row
             continue
-        for value in map(partial(Axis.to_plain_value, field_name), values):
+        for value in map(partial(Axis.to_plain_value, field_name), new_values):
             changed = {**row, field_name: value}
             if changed in points.values():
                 continue
-            new = existing.get(_point_key(changed), "")
+            new = existing.get(_convert_row_to_hashable_key(changed), "")
             if not new:
                 new = _relabel_overridden_point(
                     label,
@@ -115,9 +124,9 @@ def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> 
     return Axis(axis.dimension, points, axis.units)
 
 
-def _point_key(row: AxisRow) -> frozenset[tuple[str, Any]]:
+def _convert_row_to_hashable_key(axis_row: AxisPointFieldValues) -> frozenset[tuple[str, Any]]:
     """Convert the fields and values of a row to a hashable key."""
-    return frozenset(row.items())
+    return frozenset(axis_row.items())
 
 
 def _relabel_overridden_point(
@@ -146,7 +155,7 @@ def _format_with_all_digits(value: Any) -> str:
     return repr(value) if is_rounded else short_text
 
 
-def to_plain_values(field_name: str, value: Any) -> Any:
+def convert_to_plain_values(field_name: str, value_or_list: Any) -> Any:
     """Convert a field value, or a list of field values, to plain data.
 
     Parameters
@@ -162,7 +171,7 @@ def to_plain_values(field_name: str, value: Any) -> Any:
         Plain value or list of plain values.
     """
     return (
-        [Axis.to_plain_value(field_name, each) for each in value]
-        if is_sequence_of_axis_values(value)
-        else Axis.to_plain_value(field_name, value)
+        [Axis.to_plain_value(field_name, each) for each in value_or_list]
+        if is_sequence_of_axis_values(value_or_list)
+        else Axis.to_plain_value(field_name, value_or_list)
     )

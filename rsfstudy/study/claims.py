@@ -21,7 +21,7 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
-from rsfstudy.study.verdict_table import VerdictTable
+from rsfstudy.study.verdict_table import ClaimVerdictTable
 
 REPRODUCED_VERDICT = "reproduced"
 DIFFERS_VERDICT = "differs"
@@ -36,9 +36,9 @@ _VERDICT_TABLE_COLUMNS = (
     *("tolerance", "reason", "verdict", "expected", "difference_reason", "verdict_changed"),
 )
 #: Default reason for the tolerance of a claim. An equality requires another reason.
-TOLERANCE_REASON_OF_INEQUALITY = "an inequality"
-_EXPECTED_VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT)
-_TEXT_FIELDS = (
+DEFAULT_REASON_FOR_TOLERANCE = "an inequality"
+_ALLOWED_EXPECTED_VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT)
+_STRING_FIELDS_OF_CLAIM = (
     *("id", "statement", "source", "variable", "baseline_variable", "reason"),
     *("difference_reason", "relation", "expected"),
 )
@@ -117,7 +117,7 @@ class Claim:
     where: Mapping[str, Any]
     published: float
     tolerance: float = 0.0
-    reason: str = TOLERANCE_REASON_OF_INEQUALITY
+    reason: str = DEFAULT_REASON_FOR_TOLERANCE
     relation: str = "equals"
     baseline: Mapping[str, Any] = field(default_factory=dict)
     baseline_variable: str = ""
@@ -126,30 +126,30 @@ class Claim:
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        for name in _TEXT_FIELDS:
+        for name in _STRING_FIELDS_OF_CLAIM:
             if not isinstance(getattr(self, name), str):
                 rule = "must be a string"
                 raise self._invalid(name, getattr(self, name), rule)
         if self.relation not in CLAIM_RELATIONS:
             raise self._invalid("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
-        if self.relation == "equals" and self.reason == TOLERANCE_REASON_OF_INEQUALITY:
+        if self.relation == "equals" and self.reason == DEFAULT_REASON_FOR_TOLERANCE:
             rule = f"must explain how the tolerance, {self.tolerance}, was chosen"
             raise self._invalid("reason", self.reason, rule)
-        if self.expected not in _EXPECTED_VERDICTS:
+        if self.expected not in _ALLOWED_EXPECTED_VERDICTS:
             rule = "is not a possible verdict"
-            raise self._invalid("expected", self.expected, rule, choices=_EXPECTED_VERDICTS)
+            raise self._invalid("expected", self.expected, rule, choices=_ALLOWED_EXPECTED_VERDICTS)
         for name in ("published", "tolerance"):
             value = getattr(self, name)
-            if isinstance(value, int) and not _is_number(value):
+            if isinstance(value, int) and not _is_finite_number(value):
                 raise self._invalid(name, value, "is too large for a floating-point number")
-            if not _is_number(value) or not math.isfinite(value):
+            if not _is_finite_number(value) or not math.isfinite(value):
                 raise self._invalid(name, value, "must be a finite number")
         for name in ("where", "baseline"):
             if not isinstance(getattr(self, name), Mapping):
                 rule = "must be a mapping from coordinates to values"
                 raise self._invalid(name, getattr(self, name), rule)
             for value in getattr(self, name).values():
-                if not isinstance(value, str) and not _is_number(value):
+                if not isinstance(value, str) and not _is_finite_number(value):
                     rule = "must be strings or numbers"
                     raise self._invalid(f"coordinate values in {name!r}", value, rule)
 
@@ -283,7 +283,7 @@ def _note_on_large_error(dataset: xr.Dataset, claim: Claim) -> str:
 
 def build_verdict_table(
     dataset: xr.Dataset, claims: list[Claim], study_overrides: Mapping[str, Any]
-) -> VerdictTable:
+) -> ClaimVerdictTable:
     """Build a table of verdicts with one row per claim.
 
     Claims apply to the study as declared, without overrides. If an override has changed a fixed
@@ -310,7 +310,7 @@ def build_verdict_table(
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     is_other_study = [
         name for name in study_overrides if name not in along
-    ] or DatasetUnits.SCALES_ATTRIBUTE in dataset.attrs
+    ] or DatasetUnits.SCALES_ATTRIBUTE_NAME in dataset.attrs
     rows: list[tuple[Any, ...]] = []
     notes: dict[int, str] = {}
     for claim in claims:
@@ -335,10 +335,10 @@ def build_verdict_table(
     table = pd.DataFrame(rows, columns=_VERDICT_TABLE_COLUMNS)
     if notes:
         table["note"] = [notes.get(number, "") for number in range(len(rows))]
-    return VerdictTable(table.astype({"verdict_changed": bool}))
+    return ClaimVerdictTable(table.astype({"verdict_changed": bool}))
 
 
-def _is_number(value: object) -> bool:
+def _is_finite_number(value: object) -> bool:
     """Return True if a value is a finite number in the range of a float."""
     return isinstance(value, int | float) and not sys.float_info.max < abs(value) < math.inf
 

@@ -16,7 +16,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_list, format_value
 from rsfstudy.measures import RESERVED_NAMES, Measure
 from rsfstudy.motion import Accuracy
-from rsfstudy.quantities import is_variable_name
+from rsfstudy.quantities import is_valid_variable_name
 from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
 from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study.claims import Claim
@@ -34,7 +34,7 @@ _ITEM_TYPES_OF_STUDY_LISTS = {
 }
 
 
-def check_types(study_fields: Mapping[str, Any]) -> None:
+def check_study_field_types(study_fields: Mapping[str, Any]) -> None:
     """Raise InvalidValue if the attributes of a study have wrong types.
 
     Parameters
@@ -83,7 +83,7 @@ def check_name_clashes(
     measure.check()
     known = list(measure.variables)
     for reduction in reductions:
-        if not is_variable_name(reduction.name):
+        if not is_valid_variable_name(reduction.name):
             rule = "must be a Python identifier, because it is a variable name"
             raise InvalidValue("name of the reduction", reduction.name, rule)
         if reduction.name in RESERVED_NAMES:
@@ -128,8 +128,8 @@ def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[s
             raise InvalidValue(name, ..., rule, remedy=f"Omit {name}.")
 
 
-def check_user_fields(
-    measure: Measure, reductions: Sequence[Reduction], user_field_names: Sequence[str]
+def check_user_field_names_are_unused(
+    measure: Measure, reductions: Sequence[Reduction], scene_field_names: Sequence[str]
 ) -> None:
     """Raise InvalidValue if a user-defined part has a reserved field name.
 
@@ -149,8 +149,8 @@ def check_user_fields(
     """
     taken = {*measure.variables, *measure.inner_coordinates}
     taken |= {*RESERVED_NAMES, *QUANTITY_BY_NAME, *(reduction.name for reduction in reductions)}
-    for name in user_field_names[len(SceneFields.NAMES) :]:
-        if name in taken - SceneFields.SLOT_NAMES:
+    for name in scene_field_names[len(SceneFields.NAMES) :]:
+        if name in taken - SceneFields.PART_SLOT_NAMES:
             rule, remedy = (
                 "is already used for another quantity",
                 ("Rename the field of the user-defined part."),
@@ -158,11 +158,11 @@ def check_user_fields(
             raise InvalidValue("field", name, rule, remedy=remedy)
 
 
-def check_axis_fields(
+def check_axis_fields_and_units(
     measure: Measure,
     axes: Sequence[Axis],
     scene_field_names: Sequence[str],
-    scenes_on_rig: LatticeScenesOnRig | None,
+    axis_unit_converter: LatticeScenesOnRig | None,
 ) -> None:
     """Raise InvalidValue if an axis has unknown fields or unexpected units.
 
@@ -183,15 +183,15 @@ def check_axis_fields(
         If an axis varies an unknown field, if a zipped axis has the name of a field, or if an axis
         has units and the study has no rig.
     """
-    in_units = scenes_on_rig.units if scenes_on_rig else {}
+    in_units = axis_unit_converter.units_by_axis_name if axis_unit_converter else {}
     known = dict.fromkeys((*scene_field_names, *measure.plain_fields, *in_units))
     for axis in axes:
-        if not axis.is_single_field and axis.dimension in (*scene_field_names, *axis.fields):
+        if not axis.varies_single_field and axis.dimension in (*scene_field_names, *axis.fields):
             rule = (
                 "has the name of a field, but the name of a zipped axis must differ from all fields"
             )
             raise InvalidValue("axis", axis.dimension, rule)
-        if axis.units and scenes_on_rig is None:
+        if axis.units and axis_unit_converter is None:
             remedy = "Pass the rig to the study: Study(rig=rig)."
             raise InvalidValue(
                 "axis", axis.dimension, "has units, but the study has no rig", remedy=remedy
@@ -202,7 +202,7 @@ def check_axis_fields(
                     "is neither a field of a scene nor a number, flag or string field of the "
                     f"{measure.name} measure"
                 )
-                raise unknown_name_error("field", name, rule, known)
+                raise build_unknown_name_error("field", name, rule, known)
 
 
 def check_outputs_are_same_in_all_cells(
@@ -237,7 +237,7 @@ def check_outputs_are_same_in_all_cells(
             raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
 
 
-def check_override_of_partly_set_field(
+def check_field_is_set_at_all_axis_points(
     base_scene: Scene,
     user_parts: Mapping[str, UserPart],
     axis: Axis,
@@ -271,14 +271,14 @@ def check_override_of_partly_set_field(
     stating = [
         point for point, row in zip(axis.point_names, axis.rows, strict=True) if field_name in row
     ]
-    if axis.is_single_field or not 0 < len(stating) < len(axis):
+    if axis.varies_single_field or not 0 < len(stating) < len(axis):
         return
     for point, row in zip(axis.point_names, axis.rows, strict=True):
         held = SceneFields.replace_names_by_user_parts({**base_scene.as_dict(), **row}, user_parts)
         if (
             field_name in row
             or not held.get(field_name)
-            or field_name in SceneFields.find_inapplicable(held, user_parts.values())
+            or field_name in SceneFields.find_inapplicable_fields(held, user_parts.values())
         ):
             continue
         some = format_list(stating, ", ")
@@ -319,8 +319,8 @@ def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
             taken[name] = axis.dimension
 
 
-def unknown_name_error(
-    argument_name: str, unknown_name: str, rule: str, known_names: Collection[str]
+def build_unknown_name_error(
+    argument_name: str, unknown_name: str, violated_rule: str, known_names: Collection[str]
 ) -> InvalidValue:
     """Create the error for an unknown name.
 
@@ -341,9 +341,13 @@ def unknown_name_error(
     InvalidValue
         Error to raise.
     """
-    remedy = SceneFields.hint_for_unknown(unknown_name)
+    remedy = SceneFields.hint_for_unknown_field(unknown_name)
     return InvalidValue(
-        argument_name, unknown_name, rule, remedy=remedy, choices=() if remedy else known_names
+        argument_name,
+        unknown_name,
+        violated_rule,
+        remedy=remedy,
+        choices=() if remedy else known_names,
     )
 
 

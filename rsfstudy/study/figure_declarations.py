@@ -18,8 +18,8 @@ from rsfstudy._deprecation import accept_former_keyword_names, build_getattr_for
 from rsfstudy.axes import Axis
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantities import is_variable_name
-from rsfstudy.study.study_index import study_names
+from rsfstudy.quantities import is_valid_variable_name
+from rsfstudy.study.study_index import list_study_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,12 +31,12 @@ VariableNameOrFunction = str | Callable[["xr.Dataset"], "xr.DataArray"]
 TextOrFunction = str | Callable[["xr.Dataset"], str]
 #: Type of `matplotlib.axes.Axes` in annotations. Worker processes load this module, so the module
 #: must not import matplotlib.
-Axes = Any
+MatplotlibAxes = Any
 #: Function ``draw(dataset, axes)`` that draws a dataset on matplotlib axes.
 DrawFunction = Callable[[Any, Any], Any]
 
 #: Names of the figures that can draw the results of any study.
-GENERIC_FIGURE_NAMES = frozenset(
+BUILT_IN_FIGURE_NAMES = frozenset(
     module.name for module in pkgutil.iter_modules([str(Path(__file__).parent.parent / "plots")])
 )
 
@@ -224,7 +224,11 @@ def horizontal_line(height: float, **style: Any) -> DrawFunction:
 
 
 def reference_line(
-    x: str, function: Callable[[Any], Any], name: str, start: float | None = None, **style: Any
+    x_variable: str,
+    function: Callable[[Any], Any],
+    legend_label: str,
+    min_x: float | None = None,
+    **style: Any,
 ) -> DrawFunction:
     """Create an overlay that draws a wide grey line behind the points.
 
@@ -247,18 +251,18 @@ def reference_line(
         Function ``draw(dataset, axes)``.
     """
 
-    def draw_line(dataset: xr.Dataset, axes: Axes) -> None:
+    def draw_line(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
         """Draw the line."""
-        low, high = float(dataset[x].min()), float(dataset[x].max())
-        low = low if start is None else start
+        low, high = float(dataset[x_variable].min()), float(dataset[x_variable].max())
+        low = low if min_x is None else min_x
         at = np.linspace(low, high + 0.03 * (high - low), 200)
         wide = {"color": "0.8", "linewidth": 2.2, "linestyle": "-", "zorder": 1.5}
-        axes.plot(at, function(at), label=name, **wide | style)
+        axes.plot(at, function(at), label=legend_label, **wide | style)
 
     return draw_line
 
 
-def name_of_figure(plot: Any, study_name: str) -> str:
+def get_figure_name_for_declaration(plot: Any, study_name: str) -> str:
     """Return the name by which a study declaration refers to a figure.
 
     Parameters
@@ -279,7 +283,7 @@ def name_of_figure(plot: Any, study_name: str) -> str:
     return plot if isinstance(plot, str) else str(plot.__name__).rpartition(".")[2]
 
 
-def check_figure(plot: Any) -> None:
+def check_is_figure(plot: Any) -> None:
     """Raise InvalidValue if an object is not a figure.
 
     Parameters
@@ -306,10 +310,10 @@ def check_figure(plot: Any) -> None:
         raise InvalidValue(
             "plot", plot, rule, remedy="Define, for example, def name(dataset, axes): ..."
         )
-    name = name_of_figure(plot, "")
-    if not is_variable_name(name):
+    name = get_figure_name_for_declaration(plot, "")
+    if not is_valid_variable_name(name):
         rule = "must have a name that is a Python identifier"
         raise InvalidValue("plot", name, rule, remedy="Define the figure with def.")
-    if name in GENERIC_FIGURE_NAMES or name in study_names():
+    if name in BUILT_IN_FIGURE_NAMES or name in list_study_names():
         rule = "must have a name that differs from the figures of rsfstudy"
         raise InvalidValue("plot", name, rule, remedy="Rename the function or module.")

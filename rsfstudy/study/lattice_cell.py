@@ -22,10 +22,10 @@ class Cell(NamedTuple):
     """
 
     scene: Scene
-    measure_changes: dict[str, Any]
+    measure_field_changes: dict[str, Any]
 
 
-class CellChanges(NamedTuple):
+class CellFieldChanges(NamedTuple):
     """Values of the scene fields and measure fields that the axes change in a cell.
 
     Parameters
@@ -36,8 +36,8 @@ class CellChanges(NamedTuple):
         Measure fields that differ from the measure of the study.
     """
 
-    scene_fields: dict[str, Any]
-    measure_fields: dict[str, Any]
+    scene_field_changes: dict[str, Any]
+    measure_field_changes: dict[str, Any]
 
     def build_cell(self, base_scene: Scene) -> Cell:
         """Build the cell from a base scene.
@@ -52,4 +52,4 @@ class CellChanges(NamedTuple):
         Cell
             Cell whose scene contains the changed fields.
         """
-        return Cell(base_scene.with_(**self.scene_fields), self.measure_fields)
+        return Cell(base_scene.with_(**self.scene_field_changes), self.measure_field_changes)

@@ -27,7 +27,7 @@ def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
     Study
         Study with the rig.
     """
-    base, axes, every = RigAxes.convert_scene_and_axes(rig, study.base, study.axes)
+    base, axes, every = RigAxes.convert_scene_and_axes_to_rig(rig, study.base, study.axes)
     reductions = [
         _convert_reduction_range_to_rig_units(each, every.get(getattr(each, "on", "")))
         for each in study.reductions
@@ -35,12 +35,12 @@ def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
     return replace(study, rig=rig, base=base, axes=axes, reductions=reductions)
 
 
-def _convert_reduction_range_to_rig_units(reduction: Any, scale: float | None) -> Any:
+def _convert_reduction_range_to_rig_units(reduction: Any, coordinate_scale: float | None) -> Any:
     """Convert the coordinate range of a reduction to rig units.
 
     A reduction without a range is returned unchanged.
     """
     span = getattr(reduction, "within", None)
-    if scale is None or span is None:
+    if coordinate_scale is None or span is None:
         return reduction
-    return replace(reduction, within=tuple(scale * end for end in span))
+    return replace(reduction, within=tuple(coordinate_scale * end for end in span))

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
-from rsfstudy.axes import Axis, AxisRow
+from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
@@ -28,20 +28,24 @@ from rsfstudy.quantities import Quantity
 from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
 from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study import declaration_checks
-from rsfstudy.study.axis_overrides import replace_field_values, select_axis_points, to_plain_values
+from rsfstudy.study.axis_overrides import (
+    convert_to_plain_values,
+    replace_field_values,
+    select_axis_points,
+)
 from rsfstudy.study.claims import Claim
-from rsfstudy.study.figure_declarations import check_figure, name_of_figure
-from rsfstudy.study.lattice_cell import Cell, CellChanges
+from rsfstudy.study.figure_declarations import check_is_figure, get_figure_name_for_declaration
+from rsfstudy.study.lattice_cell import Cell, CellFieldChanges
 from rsfstudy.study.reductions.application import Reduction
-from rsfstudy.study.study_html import study_html
-from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantities
+from rsfstudy.study.study_html import format_study_as_html
+from rsfstudy.study.user_parts import find_user_parts_in_axis_rows, list_user_field_quantities
 
 #: Maximum length of the name of a study in bytes. Most file systems allow file names of at most 255
 #: bytes, and the names of files have suffixes.
-_MAX_NAME_BYTES = 200
+_MAX_STUDY_NAME_BYTES = 200
 #: Scene fields that select the type of a part of the slider, for example the friction law.
-_SLOT_AND_PART_SELECTING_FIELDS = frozenset(
-    {*SceneFields.SLOT_NAMES, *SceneFields.SELECTING_A_PART}
+_PART_SELECTING_FIELDS = frozenset(
+    {*SceneFields.PART_SLOT_NAMES, *SceneFields.NAMES_SELECTING_A_PART}
 )
 #: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio to the reference
 #: velocity. The spring can be given as a stiffness or as a ratio to the critical stiffness.
@@ -49,7 +53,11 @@ _EQUIVALENT_FIELD_BY_FIELD_NAME = {
     **RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME,
     **{ratio: name for name, ratio in RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
     **dict(
-        zip(SceneFields.ALTERNATIVE_STIFFNESS, SceneFields.ALTERNATIVE_STIFFNESS[::-1], strict=True)
+        zip(
+            SceneFields.ALTERNATIVE_NAMES_FOR_STIFFNESS,
+            SceneFields.ALTERNATIVE_NAMES_FOR_STIFFNESS[::-1],
+            strict=True,
+        )
     ),
 }
 
@@ -144,26 +152,30 @@ class Study:
             raise InvalidValue(
                 "name", self.name, "must be a Python identifier, because it is used in file names"
             )
-        if len(self.name.encode()) > _MAX_NAME_BYTES:
-            rule = f"must have at most {_MAX_NAME_BYTES} bytes, because it is used in file names"
+        if len(self.name.encode()) > _MAX_STUDY_NAME_BYTES:
+            rule = (
+                f"must have at most {_MAX_STUDY_NAME_BYTES} bytes, because it is used in file names"
+            )
             raise InvalidValue("name", self.name, rule)
         for name in ("title", "summary", "source_file"):
             Axis.check_storable_text(name, getattr(self, name))
-        check_figure(self.plot)
+        check_is_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
         if not isinstance(self.overrides, Mapping):
             raise InvalidValue("overrides", self.overrides, "must map names to values")
-        declaration_checks.check_types(vars(self))
+        declaration_checks.check_study_field_types(vars(self))
         if self.rig is not None:
             object.__setattr__(
-                self, "axes", [RigAxes.convert_to_stated_units(axis) for axis in self.axes]
+                self, "axes", [RigAxes.convert_axis_to_stated_units(axis) for axis in self.axes]
             )
         declaration_checks.check_name_clashes(self.measure, self.reductions, self.axes)
-        declaration_checks.check_user_fields(self.measure, self.reductions, self.scene_fields)
-        declaration_checks.check_axis_fields(
-            self.measure, self.axes, self.scene_fields, self.scene_builder
+        declaration_checks.check_user_field_names_are_unused(
+            self.measure, self.reductions, self.scene_fields
+        )
+        declaration_checks.check_axis_fields_and_units(
+            self.measure, self.axes, self.scene_fields, self.axis_unit_converter
         )
         varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self.scene_field_names]
         changes = (self.split_rows(rows)[1] for rows in itertools.product(*varied))
@@ -216,7 +228,7 @@ class Study:
         """
         parts: dict[str, UserPart] = {}
         for axis in self.axes:
-            parts |= find_named_user_parts(axis.fields, axis.rows)
+            parts |= find_user_parts_in_axis_rows(axis.fields, axis.rows)
         parts |= {part.name: part for part in self.base.user_parts}
         return dict(sorted(parts.items()))
 
@@ -235,7 +247,7 @@ class Study:
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:
         """Names of all scene fields, including fields of user-defined parts."""
-        return tuple(SceneFields.quantities_with_user_parts(self.user_parts.values()))
+        return tuple(SceneFields.collect_quantities_with_user_parts(self.user_parts.values()))
 
     @cached_property
     def scene_field_names(self) -> frozenset[str]:
@@ -246,7 +258,7 @@ class Study:
         return frozenset({*self.scene_fields, *self.units})
 
     @cached_property
-    def scene_builder(self) -> LatticeScenesOnRig | None:
+    def axis_unit_converter(self) -> LatticeScenesOnRig | None:
         """Object that converts axis values with units to scene fields.
 
         The property is None if the study has no rig.
@@ -258,7 +270,7 @@ class Study:
         """Units of the axis fields that have units."""
         return {name: units for axis in self.axes for name, units in axis.units.items()}
 
-    def scene_fields_of_row(self, row: AxisRow) -> AxisRow:
+    def scene_fields_of_row(self, axis_row: AxisPointFieldValues) -> AxisPointFieldValues:
         """Convert the axis values of a cell to scene fields.
 
         Parameters
@@ -271,7 +283,11 @@ class Study:
         mapping of str to object
             Scene fields that differ from the base scene.
         """
-        return self.scene_builder.compute_scene_fields(row) if self.scene_builder else row
+        return (
+            self.axis_unit_converter.compute_scene_fields(axis_row)
+            if self.axis_unit_converter
+            else axis_row
+        )
 
     @property
     def quantities(self) -> dict[str, Quantity]:
@@ -279,7 +295,7 @@ class Study:
 
         The dictionary contains only quantities that are not in the common vocabulary.
         """
-        stated = *user_field_quantities(self.user_parts.values()), *self.measure.quantities
+        stated = *list_user_field_quantities(self.user_parts.values()), *self.measure.quantities
         return {about.name: about for about in stated}
 
     # ---- the lattice ------------------------------------------------------------------------
@@ -339,9 +355,9 @@ class Study:
         Cell
             Cell with its scene and with the changed values of measure fields.
         """
-        return self._build_cell(self._axis_rows_of_cell(number))
+        return self._build_cell(self._find_axis_rows_of_cell(number))
 
-    def cell_changes(self, number: int) -> CellChanges:
+    def cell_changes(self, number: int) -> CellFieldChanges:
         """Compute the field values that the axes change in one cell.
 
         This method does not build a scene, so it is faster than `cell`.
@@ -356,9 +372,9 @@ class Study:
         CellChanges
             Changed fields of the base scene and of the measure.
         """
-        return self._compute_cell_changes(self._axis_rows_of_cell(number))
+        return self._compute_cell_changes(self._find_axis_rows_of_cell(number))
 
-    def _axis_rows_of_cell(self, cell_number: int) -> list[AxisRow]:
+    def _find_axis_rows_of_cell(self, cell_number: int) -> list[AxisPointFieldValues]:
         """Return the field values that each axis sets in a cell."""
         places = np.unravel_index(cell_number, self.shape)
         return [axis.rows[i] for axis, i in zip(self.axes, places, strict=True)]
@@ -404,7 +420,9 @@ class Study:
         at = zip(self.axes, np.unravel_index(cell, self.shape), strict=True)
         return ", ".join(f"{axis.dimension} = {axis.point_names[i]}" for axis, i in at)
 
-    def split_rows(self, rows: Sequence[AxisRow]) -> tuple[dict[str, Any], dict[str, Any]]:
+    def split_rows(
+        self, axis_rows: Sequence[AxisPointFieldValues]
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Separate the fields of the scene from the fields of the measure.
 
         Parameters
@@ -420,13 +438,13 @@ class Study:
             Values of the measure fields.
         """
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
-        for row in rows:
+        for row in axis_rows:
             for name, value in row.items():
                 split[name not in self.scene_field_names][name] = value
         return split
 
     @cached_property
-    def _base_fields(self) -> dict[str, Any]:
+    def _base_scene_fields(self) -> dict[str, Any]:
         """Fields of the base scene."""
         return self.base.as_dict()
 
@@ -437,35 +455,34 @@ class Study:
         The set is valid for cells in which no axis selects a part.
         """
         parts = self.user_parts
-        return SceneFields.find_inapplicable(
-            SceneFields.replace_names_by_user_parts(self._base_fields, parts), parts.values()
+        return SceneFields.find_inapplicable_fields(
+            SceneFields.replace_names_by_user_parts(self._base_scene_fields, parts), parts.values()
         )
 
-    def _compute_cell_changes(self, axis_rows: Sequence[AxisRow]) -> CellChanges:
+    def _compute_cell_changes(self, axis_rows: Sequence[AxisPointFieldValues]) -> CellFieldChanges:
         """Compute the changed fields of the cell at the given axis points."""
         given, of_measure = self.split_rows(axis_rows)
         of_scene = self.scene_fields_of_row(given)
-        if _SLOT_AND_PART_SELECTING_FIELDS.isdisjoint(
-            of_scene
-        ) and _SLOT_AND_PART_SELECTING_FIELDS.isdisjoint(given):
+        if _PART_SELECTING_FIELDS.isdisjoint(of_scene) and _PART_SELECTING_FIELDS.isdisjoint(given):
             kept = {
                 n: value for n, value in of_scene.items() if n not in self._inapplicable_base_fields
             }
-            return CellChanges(kept, of_measure)
+            return CellFieldChanges(kept, of_measure)
         # If a row selects a part and also sets a field without a meaning for this part, the field
         # is kept, so that the scene rejects the field.
         stated = {
-            name
-            for row in axis_rows
-            if not _SLOT_AND_PART_SELECTING_FIELDS.isdisjoint(row)
-            for name in row
+            name for row in axis_rows if not _PART_SELECTING_FIELDS.isdisjoint(row) for name in row
         }
         parts = self.user_parts
-        values = SceneFields.replace_names_by_user_parts({**self._base_fields, **of_scene}, parts)
-        meaningless = SceneFields.find_inapplicable(values, parts.values()) - stated
-        return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
+        values = SceneFields.replace_names_by_user_parts(
+            {**self._base_scene_fields, **of_scene}, parts
+        )
+        meaningless = SceneFields.find_inapplicable_fields(values, parts.values()) - stated
+        return CellFieldChanges(
+            {n: values[n] for n in of_scene if n not in meaningless}, of_measure
+        )
 
-    def _build_cell(self, axis_rows: Sequence[AxisRow]) -> Cell:
+    def _build_cell(self, axis_rows: Sequence[AxisPointFieldValues]) -> Cell:
         """Build the cell at the given axis points."""
         try:
             return self._compute_cell_changes(axis_rows).build_cell(self.base)
@@ -516,15 +533,18 @@ class Study:
         >>> study.with_(phi=[30, 45, 60], alpha=[0.0, 0.5]).shape
         (2, 3)
         """
-        study, given = self, {name: to_plain_values(name, v) for name, v in overrides.items()}
+        study, given = (
+            self,
+            {name: convert_to_plain_values(name, v) for name, v in overrides.items()},
+        )
         # User-defined parts are replaced first, because they may define the fields of other
         # overrides.
         own = [
             name
             for name in given
-            if find_named_user_parts([name], _rows_of_overridden_field(name, given[name]))
+            if find_user_parts_in_axis_rows([name], _build_axis_rows_of_override(name, given[name]))
         ]
-        selections = [axis.dimension for axis in self.axes if not axis.is_single_field]
+        selections = [axis.dimension for axis in self.axes if not axis.varies_single_field]
         for name in dict.fromkeys([*own, *filter(given.__contains__, selections), *given]):
             study = study._override_field(name, given[name])
         return replace(study, overrides={**self.overrides, **given})
@@ -534,34 +554,40 @@ class Study:
         values = list(value) if is_sequence_of_axis_values(value) else [value]
         of_rig = self.rig is not None and bool(values)
         field_name, units = (
-            RigAxes.name_and_units(field_name, values[0]) if of_rig else (field_name, None)
+            RigAxes.find_axis_name_and_si_units(field_name, values[0])
+            if of_rig
+            else (field_name, None)
         )
         for index, axis in enumerate(self.axes):
-            if changed := self._override_axis(axis, field_name, values):
+            if changed := self._override_values_of_axis(axis, field_name, values):
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
         of_rig = units is not None
         known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
         if (
             field_name not in known
             and not of_rig
-            and not find_named_user_parts(
-                [field_name], _rows_of_overridden_field(field_name, values)
+            and not find_user_parts_in_axis_rows(
+                [field_name], _build_axis_rows_of_override(field_name, values)
             )
         ):
             rule = "is neither an axis nor a field of the scene or of the measure"
-            raise declaration_checks.unknown_name_error("override", field_name, rule, known)
+            raise declaration_checks.build_unknown_name_error("override", field_name, rule, known)
         declaration_checks.check_fields_not_solved_by_measure(self.measure, [field_name])
         if is_sequence_of_axis_values(value):
-            return replace(self, axes=(self._make_axis(field_name, values), *self.axes))
+            return replace(
+                self, axes=(self._make_single_field_axis(field_name, values), *self.axes)
+            )
         if self.rig is not None and of_rig:
             rig, base = RigAxes.replace_rig_quantity(self.rig, self.base, field_name, value)
             return replace(self, rig=rig, base=base)
-        if field_name in self.scene_field_names | SceneFields.SLOT_NAMES:
+        if field_name in self.scene_field_names | SceneFields.PART_SLOT_NAMES:
             changes = SceneFields.replace_names_by_user_parts({field_name: value}, self.user_parts)
             return replace(self, base=self.base.with_(**changes))
         return replace(self, measure=self.measure.with_(**{field_name: value}))
 
-    def _override_axis(self, axis: Axis, field_name: str, values: Sequence[Any]) -> Axis | None:
+    def _override_values_of_axis(
+        self, axis: Axis, field_name: str, values: Sequence[Any]
+    ) -> Axis | None:
         """Apply an override to one axis.
 
         The result is None if the axis varies neither the overridden field nor an equivalent field.
@@ -569,18 +595,18 @@ class Study:
         units = axis.units.get(field_name, "")
         if field_name == axis.dimension:
             return (
-                self._make_axis(field_name, values, units)
-                if axis.is_single_field
+                self._make_single_field_axis(field_name, values, units)
+                if axis.varies_single_field
                 else select_axis_points(axis, values)
             )
         if field_name in axis.fields:
-            declaration_checks.check_override_of_partly_set_field(
+            declaration_checks.check_field_is_set_at_all_axis_points(
                 self.base, self.user_parts, axis, field_name, values
             )
             return replace_field_values(
                 axis,
                 field_name,
-                RigAxes.convert_values(field_name, values, units) if units else values,
+                RigAxes.convert_values_to_units(field_name, values, units) if units else values,
             )
         if _EQUIVALENT_FIELD_BY_FIELD_NAME.get(field_name) not in axis.fields:
             return None
@@ -595,16 +621,18 @@ class Study:
                 rule,
                 remedy=f"Override {_EQUIVALENT_FIELD_BY_FIELD_NAME[field_name]} instead.",
             )
-        return self._make_axis(field_name, values)
+        return self._make_single_field_axis(field_name, values)
 
-    def _make_axis(self, field_name: str, values: Sequence[Any], units: str = "") -> Axis:
+    def _make_single_field_axis(
+        self, field_name: str, values: Sequence[Any], units: str = ""
+    ) -> Axis:
         """Create an axis that varies one field.
 
         For a study with a rig, numbers without units are assumed to be in ``units``.
         """
         if self.rig is None:
             return Axis(field_name, values)
-        return RigAxes.create(field_name, values, "" if isinstance(values[0], str) else units)
+        return RigAxes.create_axis(field_name, values, "" if isinstance(values[0], str) else units)
 
     def describe(self) -> dict[str, Any]:
         """Convert the declaration to a dictionary of plain values.
@@ -634,13 +662,13 @@ class Study:
     @property
     def figure_name(self) -> str:
         """Name of the figure in the declaration of the study."""
-        return name_of_figure(self.plot, self.name)
+        return get_figure_name_for_declaration(self.plot, self.name)
 
     def _repr_html_(self) -> str:
         heading = f"{self.name}: {self.title} ({self.size:,} cells)"
-        return study_html(heading, self.axes, self.base, self.measure, self.quantities)
+        return format_study_as_html(heading, self.axes, self.base, self.measure, self.quantities)
 
 
-def _rows_of_overridden_field(field_name: str, value: Any) -> list[AxisRow]:
+def _build_axis_rows_of_override(field_name: str, value: Any) -> list[AxisPointFieldValues]:
     """Return one axis row for each value of an overridden field."""
     return [{field_name: v} for v in (value if is_sequence_of_axis_values(value) else [value])]

@@ -8,12 +8,12 @@ from dataclasses import replace
 from rsfstudy.axes import Axis
 from rsfstudy.formatting import format_list
 from rsfstudy.measures import Measure
-from rsfstudy.quantities import HtmlMarkup, Quantity, html_quantities_table
+from rsfstudy.quantities import HtmlMarkup, Quantity, format_quantities_as_html_table
 from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.vocabulary import find_quantity
 
 
-def study_html(
+def format_study_as_html(
     heading: str,
     axes: Sequence[Axis],
     base_scene: Scene,
@@ -42,27 +42,29 @@ def study_html(
     """
     varied = {name for axis in axes for name in axis.fields}
     fixed = {name: v for name, v in base_scene.as_dict().items() if name not in varied}
-    shared = SceneFields.quantities_with_values(fixed, base_scene.user_parts)
-    along = [(_describe_axis_quantity(a, known_quantities), _format_axis_points(a)) for a in axes]
+    shared = SceneFields.iterate_quantities_with_values(fixed, base_scene.user_parts)
+    along = [(_find_axis_quantity(a, known_quantities), _format_axis_points(a)) for a in axes]
     measured = [(find_quantity(name, known_quantities), None) for name in measure.variables]
     return (
-        html_quantities_table(along, heading)
-        + _html_details("fields of all cells", html_quantities_table(shared))
-        + _html_details(
+        format_quantities_as_html_table(along, heading)
+        + _build_collapsed_html_section(
+            "fields of all cells", format_quantities_as_html_table(shared)
+        )
+        + _build_collapsed_html_section(
             f"results of {measure.name} in each cell",
-            html_quantities_table(measured, with_values=False),
+            format_quantities_as_html_table(measured, with_values=False),
         )
     )
 
 
-def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
+def _build_collapsed_html_section(caption: str, content: HtmlMarkup) -> HtmlMarkup:
     """Return HTML code that shows the content when the user clicks the caption."""
     return HtmlMarkup(
         f"<details><summary>{HtmlMarkup.escape(caption)}</summary>{content}</details>"
     )
 
 
-def _describe_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:
+def _find_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:
     """Return the quantity that an axis varies.
 
     If the axis has units, the returned quantity has no symbol and no scale.

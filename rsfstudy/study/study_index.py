@@ -11,10 +11,10 @@ import pkgutil
 from pathlib import Path
 
 #: Import path of the package with the named studies.
-STUDIES_PACKAGE = "rsfstudy.named_studies"
+NAMED_STUDIES_PACKAGE = "rsfstudy.named_studies"
 
 
-def study_names() -> tuple[str, ...]:
+def list_study_names() -> tuple[str, ...]:
     """Return the names of all studies in the folder ``studies``.
 
     Returns
@@ -23,12 +23,12 @@ def study_names() -> tuple[str, ...]:
         Names in alphabetical order. Modules whose names start with an underscore are omitted,
         because they contain code that studies share.
     """
-    package = importlib.import_module(STUDIES_PACKAGE)
+    package = importlib.import_module(NAMED_STUDIES_PACKAGE)
     modules = (module.name for module in pkgutil.iter_modules(package.__path__))
     return tuple(sorted(name for name in modules if not name.startswith("_")))
 
 
-def study_titles() -> dict[str, str]:
+def read_study_titles() -> dict[str, str]:
     """Read the titles of the named studies from their source files.
 
     Returns
@@ -36,8 +36,8 @@ def study_titles() -> dict[str, str]:
     dict of str to str
         Titles by name.
     """
-    (place,) = importlib.import_module(STUDIES_PACKAGE).__path__
-    files = {name: Path(place, f"{name}.py") for name in study_names()}
+    (place,) = importlib.import_module(NAMED_STUDIES_PACKAGE).__path__
+    files = {name: Path(place, f"{name}.py") for name in list_study_names()}
     return {name: _read_title_from_source(file.read_bytes()) for name, file in files.items()}
 
 

@@ -17,8 +17,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.path_checks import check_path
-from rsfstudy.study.study_index import STUDIES_PACKAGE, study_names
+from rsfstudy.path_checks import check_path_is_valid
+from rsfstudy.study.study_index import NAMED_STUDIES_PACKAGE, list_study_names
 
 if TYPE_CHECKING:
     from rsfstudy.study.study import Study
@@ -43,14 +43,14 @@ def load_study(name_or_file: str) -> Study:
         If there is no study with this name, if the file cannot be read or raises an exception, or
         if the file does not declare a study. For an unknown name, the message lists similar names.
     """
-    check_path("study", name_or_file)
+    check_path_is_valid("study", name_or_file)
     if name_or_file.endswith(".py"):
         return replace(
-            _study_in_module(_import_study_file(Path(name_or_file)), name_or_file),
+            _read_study_from_module(_import_study_file(Path(name_or_file)), name_or_file),
             source_file=name_or_file,
         )
-    if name_or_file not in study_names():
-        near = difflib.get_close_matches(name_or_file, study_names(), n=3, cutoff=0.5)
+    if name_or_file not in list_study_names():
+        near = difflib.get_close_matches(name_or_file, list_study_names(), n=3, cutoff=0.5)
         remedy = (
             "Run `rsfstudy list` to see all names, or pass the path of a study file "
             "(path/to/study.py)."
@@ -61,7 +61,7 @@ def load_study(name_or_file: str) -> Study:
                 (f"To load the file in the current directory, write {name_or_file}.py."),
             )
         raise InvalidValue("study", name_or_file, "is unknown", choices=near, remedy=remedy)
-    study: Study = importlib.import_module(f"{STUDIES_PACKAGE}.{name_or_file}").study
+    study: Study = importlib.import_module(f"{NAMED_STUDIES_PACKAGE}.{name_or_file}").study
     return study
 
 
@@ -91,14 +91,14 @@ def _import_study_file(study_file: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except InvalidValue as error:
-        raise error.with_location(f"{path}{_describe_error_line(error, path)}") from error
+        raise error.with_location(f"{path}{_format_line_number_of_error(error, path)}") from error
     except SyntaxError as error:
         place = f"{error.filename or path}, line {error.lineno}"
         raise InvalidValue(
             "study", str(path), f"has a syntax error in {place}: {error.msg}"
         ) from error
     except (Exception, SystemExit) as error:
-        rule = f"raises {type(error).__name__}{_describe_error_line(error, path)}: {error}"
+        rule = f"raises {type(error).__name__}{_format_line_number_of_error(error, path)}: {error}"
         raise InvalidValue("study", str(path), rule) from error
     finally:
         sys.path.remove(str(path.parent))
@@ -116,7 +116,7 @@ def _is_module_in_directory_of(module_name: str, study_file: Path) -> bool:
     return any(Path(place).parent == study_file.parent for place in places if place)
 
 
-def _describe_error_line(error: BaseException, study_file: Path) -> str:
+def _format_line_number_of_error(error: BaseException, study_file: Path) -> str:
     """Return the line of the study file that raised an error.
 
     The string is empty if the error was not raised in the study file.
@@ -129,7 +129,7 @@ def _describe_error_line(error: BaseException, study_file: Path) -> str:
     return f", line {lines[-1]}" if lines else ""
 
 
-def _study_in_module(module: ModuleType, study_name: str) -> Study:
+def _read_study_from_module(module: ModuleType, study_name: str) -> Study:
     """Return the study that a module declares."""
     # This import is slow and is not needed to list the names of studies.
     from rsfstudy.study.study import Study
@@ -142,7 +142,7 @@ def _study_in_module(module: ModuleType, study_name: str) -> Study:
             "does not define a study",
             remedy="Define, for example, study = Study(...).",
         )
-    if study.name in study_names():
+    if study.name in list_study_names():
         rule = (
             f"defines the study {study.name!r}, but rsfstudy already has a study with this "
             "name, and both studies would write the same files"

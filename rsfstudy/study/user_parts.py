@@ -9,8 +9,8 @@ from rsfstudy.quantities import Quantity
 from rsfstudy.slider import SceneFields, UserPart
 
 
-def find_named_user_parts(
-    names: Iterable[str], rows: Iterable[Mapping[str, Any]]
+def find_user_parts_in_axis_rows(
+    field_names: Iterable[str], axis_rows: Iterable[Mapping[str, Any]]
 ) -> dict[str, UserPart]:
     """Find the user-defined parts that are named in field values.
 
@@ -26,14 +26,16 @@ def find_named_user_parts(
     dict of str to type or UserLoading
         User-defined parts by name.
     """
-    slots = [slot for slot in SceneFields.SLOTS if slot.user_parts and slot.name in names]
-    places = ((slot, row.get(slot.name)) for row in rows for slot in slots)
+    slots = [
+        slot for slot in SceneFields.PART_SLOTS if slot.user_parts and slot.name in field_names
+    ]
+    places = ((slot, row.get(slot.name)) for row in axis_rows for slot in slots)
     return {
         n: slot.user_parts[n] for slot, n in places if isinstance(n, str) and n in slot.user_parts
     }
 
 
-def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
+def list_user_field_quantities(user_parts: Iterable[UserPart]) -> Iterator[Quantity]:
     """Return the quantities of the fields that user-defined parts add.
 
     Parameters
@@ -48,6 +50,6 @@ def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
     """
     return (
         about
-        for name, about in SceneFields.quantities_with_user_parts(parts).items()
+        for name, about in SceneFields.collect_quantities_with_user_parts(user_parts).items()
         if name not in SceneFields.NAMES
     )

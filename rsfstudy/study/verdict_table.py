@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 import pandas as pd
 
 from rsfstudy.errors import escape_control_characters
-from rsfstudy.former_data_names import NEW_VERDICT_COLUMNS, TableWithFormerColumns
+from rsfstudy.former_data_names import NEW_VERDICT_COLUMN_BY_FORMER_COLUMN, TableWithFormerColumns
 from rsfstudy.quantities import HtmlMarkup
 
-_SIGN_BY_CLAIM_RELATION = {"equals": "", "below": "< ", "above": "> "}
+_INEQUALITY_SIGN_BY_RELATION = {"equals": "", "below": "< ", "above": "> "}
 #: Width of a line on a terminal, and width of the column with the identifiers of the claims, in
 #: characters.
 _TERMINAL_LINE_WIDTH, _CLAIM_ID_WIDTH = 100, 12
@@ -42,7 +42,7 @@ def format_published_value(verdict_row: dict[Any, Any]) -> str:
     str
         Published value. The value of an inequality is preceded by ``<`` or ``>``.
     """
-    return f"{_SIGN_BY_CLAIM_RELATION[verdict_row['relation']]}{verdict_row['published']:.6g}"
+    return f"{_INEQUALITY_SIGN_BY_RELATION[verdict_row['relation']]}{verdict_row['published']:.6g}"
 
 
 def _format_row_for_terminal(verdict_row: dict[Any, Any]) -> dict[str, str]:
@@ -57,7 +57,7 @@ def _format_row_for_terminal(verdict_row: dict[Any, Any]) -> dict[str, str]:
     }
 
 
-def _align_columns(rows: list[dict[str, str]]) -> str:
+def _format_aligned_table(rows: list[dict[str, str]]) -> str:
     """Align the columns of a table under their headings.
 
     The column with the statements is shortened to fit the width of the terminal.
@@ -72,32 +72,34 @@ def _align_columns(rows: list[dict[str, str]]) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-class VerdictTable(TableWithFormerColumns):
+class ClaimVerdictTable(TableWithFormerColumns):
     """Table of the verdicts on claims, with one row per claim.
 
     Selections from the table are ordinary data frames.
     """
 
-    NEW_COLUMNS: ClassVar[Mapping[str, str]] = NEW_VERDICT_COLUMNS
+    NEW_COLUMN_BY_FORMER_COLUMN: ClassVar[Mapping[str, str]] = NEW_VERDICT_COLUMN_BY_FORMER_COLUMN
 
     def __repr__(self) -> str:
         """Format the table for a terminal."""
         if self.empty or not set(_COLUMNS_PRINTED_ON_TERMINAL) <= set(self):
             return super().__repr__()
         return escape_control_characters(
-            _align_columns([_format_row_for_terminal(row) for row in self.to_dict("records")])
+            _format_aligned_table(
+                [_format_row_for_terminal(row) for row in self.to_dict("records")]
+            )
         )
 
     def _repr_html_(self) -> str:
-        rows = [format_verdict_row(row) for row in self.to_dict("records")]
+        rows = [format_verdict_row_for_report(row) for row in self.to_dict("records")]
         return (
-            HtmlMarkup.table(list(rows[0]), [list(row.values()) for row in rows])
+            HtmlMarkup.format_table(list(rows[0]), [list(row.values()) for row in rows])
             if rows
             else "<p>no claims</p>"
         )
 
 
-def format_verdict_row(verdict_row: dict[Any, Any]) -> dict[str, str]:
+def format_verdict_row_for_report(verdict_row: dict[Any, Any]) -> dict[str, str]:
     """Format the cells of a verdict row for a notebook or a report.
 
     Parameters

@@ -69,10 +69,10 @@ def main(
 
 @click.command()
 @click.argument("study")
-@options.set_values_option
+@options.set_axis_values_option
 @options.rtol_option
 @options.engine_option
-@options.output_option
+@options.output_directory_option
 def command(study: str, settings: tuple[str, ...], **choices: Any) -> None:
     """Run a named study or a study file (STUDY) on a SLURM cluster."""
     overrides = assignment_parsing.parse_overrides(study_loader.load_study(study), settings)

@@ -28,8 +28,8 @@ from rsfstudy import reductions as reduce
 from rsfstudy.cli.command_line import cli
 from rsfstudy.measures import Measure, Output, Quantity, Status
 from rsfstudy.parts import Part
-from rsfstudy.quantities import html_symbol as in_html
-from rsfstudy.quantities import html_unit as unit_in_html
+from rsfstudy.quantities import format_symbol_as_html as in_html
+from rsfstudy.quantities import format_unit_as_html as unit_in_html
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig import rig_quantities
 from rsfstudy.slider import SceneFields, part_registry
@@ -199,7 +199,7 @@ def scene_fields() -> str:
         Table in Markdown.
     """
     abouts = {about.name: about for about in part_registry.SCENE_FIELD_QUANTITIES}
-    defaults = part_registry.scene_field_defaults()
+    defaults = part_registry.collect_scene_field_defaults()
     rows = (
         (
             f"`{name}`",
@@ -248,9 +248,9 @@ def _parts_with(name: str) -> str:
     """
     owners = [
         f"`{part.name}`"
-        for slot in part_registry.SLOTS
+        for slot in part_registry.PART_SLOTS
         for part in slot.built_in_parts.values()
-        if name in SceneFields.names_of_part(part)
+        if name in SceneFields.list_names_of_part(part)
     ]
     return ", ".join(owners)
 
@@ -263,15 +263,15 @@ def parts() -> str:
     str
         Sections in Markdown.
     """
-    return "\n\n".join(_slot(slot) for slot in part_registry.SLOTS)
+    return "\n\n".join(_slot(slot) for slot in part_registry.PART_SLOTS)
 
 
-def _slot(slot: part_registry.Slot) -> str:
+def _slot(slot: part_registry.PartSlot) -> str:
     """Format the section of a type of component, such as the friction law."""
     rows = (
         (f"`{name}`" + (" (default)" if name == slot.default_part_name else ""),
          first_paragraph(part), equation(part),
-         ", ".join(f"`{own}`" for own in SceneFields.names_of_part(part)), f"`{SCENES[name]}`")
+         ", ".join(f"`{own}`" for own in SceneFields.list_names_of_part(part)), f"`{SCENES[name]}`")
         for name, part in slot.built_in_parts.items()
     )  # fmt: skip
     made = markdown_table(("choice", "description", "equation", "fields", "example"), rows)
@@ -334,7 +334,8 @@ def rig() -> str:
         Table in Markdown.
     """
     must = {
-        name: name in rig_quantities.REQUIRED_QUANTITIES for name in rig_quantities.RIG_QUANTITIES
+        name: name in rig_quantities.REQUIRED_RIG_QUANTITIES
+        for name in rig_quantities.RIG_QUANTITIES
     }
     rows = (
         (f"`{name}`", units, must[name], f"{least:g} to {most:g}")
@@ -405,7 +406,7 @@ def _measure(kind: type[Measure], example: Measure | None) -> str:
 @cache
 def _studies() -> dict[str, Study]:
     """Return the named studies by name."""
-    return {name: study_loader.load_study(name) for name in study_index.study_names()}
+    return {name: study_loader.load_study(name) for name in study_index.list_study_names()}
 
 
 def _format_call(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:

@@ -43,7 +43,7 @@ def cases() -> dict[str, tuple[Measure, Scene]]:
 
 def record_calls(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
     """Return copies of the arguments of all calls of the compiled loop."""
-    run, kept = numba_backend.get_compiled_loop(), list[tuple[Any, ...]]()
+    run, kept = numba_backend.compile_or_load_motion_loop(), list[tuple[Any, ...]]()
 
     def noting(*arguments: Any) -> Any:
         kept.append(copy_arguments(arguments))
@@ -74,7 +74,7 @@ def repeated_call_time(calls: list[tuple[Any, ...]]) -> float:
 
     The time of the copies is excluded.
     """
-    run = numba_backend.get_compiled_loop()
+    run = numba_backend.compile_or_load_motion_loop()
     arguments = [copy_arguments(each) for each in calls]
     began = time.perf_counter()
     for each in arguments:

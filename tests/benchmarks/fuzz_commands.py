@@ -273,7 +273,7 @@ def field_names() -> tuple[str, ...]:
     from rsfstudy.slider import part_registry
 
     return (
-        *part_registry.scene_field_defaults(),
+        *part_registry.collect_scene_field_defaults(),
         "case",
         "sample",
         "stiffnes",

@@ -15,7 +15,7 @@ from explorer_pages import STEP, download_files, text_of
 from study_runs import call_main
 
 import rsfstudy
-from rsfstudy.reporting import format_with_error
+from rsfstudy.reporting import format_value_with_stderr
 
 READING = {"normal_stress": "20 MPa"}
 FIT = {"laws": ["slowness"], "stiffness": "0.04 MPa/um"}
@@ -91,7 +91,9 @@ def expected_cells(fits):
     """Return the cells that a table of fits must show."""
     row = fits.rsf.fit_table().iloc[0]
     names = {"a": "a", "b": "b", "Dc (um)": "Dc", "mu_0": "mu_0"}
-    cells = {head: format_with_error(row[n], row[f"{n}_stderr"]) for head, n in names.items()}
+    cells = {
+        head: format_value_with_stderr(row[n], row[f"{n}_stderr"]) for head, n in names.items()
+    }
     return cells | {"AIC": f"{row['aic']:.1f}"}
 
 

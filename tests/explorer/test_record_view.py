@@ -13,10 +13,10 @@ FIT = {"laws": ["slowness"], "stiffness": "0.04 MPa/um"}
 
 def test_the_code_of_a_record_in_memory_uses_the_record():
     record = rsfstudy.read_record(STEP, **READING)
-    view = RecordView.restore(record, FIT | {"end": 130.0, "after": "60 um"})
-    assert view.command_line().startswith("#")
+    view = RecordView.create_with_widget_state(record, FIT | {"end": 130.0, "after": "60 um"})
+    assert view.write_command_line().startswith("#")
     variables = {"record": record}
-    exec(view.python_code(), variables)
+    exec(view.write_python_code(), variables)
     assert variables["record"].time[-1] == 130.0
     assert variables["fit"].sizes["law"] == 1
 
@@ -27,8 +27,8 @@ def test_a_record_of_slip_is_read_with_the_stiffness(tmp_path):
     path = tmp_path / "slip.csv"
     columns = {"Time (s)": record.time, "Slip (um)": slip, "Friction": record.columns["friction"]}
     pd.DataFrame(columns).to_csv(path, index=False)
-    view = RecordView.restore(path, {"stiffness": "2e-3 1/um", "after": "60 um"})
-    reading = view.python_code().partition("fit = ")[0]
+    view = RecordView.create_with_widget_state(path, {"stiffness": "2e-3 1/um", "after": "60 um"})
+    reading = view.write_python_code().partition("fit = ")[0]
     variables = {}
     exec(reading, variables)
     moved = variables["record"].columns["displacement"]

@@ -15,7 +15,7 @@ from playwright.sync_api import expect
 from study_runs import call_main
 
 import rsfstudy
-from rsfstudy.explorer.result_arrays import thin_curve
+from rsfstudy.explorer.result_arrays import choose_drawn_point_indices
 
 VARIABLE = "critical_velocity_ratio"
 #: Script that returns the data sources with a given column. The document in the browser keeps the
@@ -123,7 +123,9 @@ def test_a_click_shows_the_motion_of_a_cell(open_state, results):
     motion = rsfstudy.simulate(moving, rtol=1e-4)
     curves = [source["y"] for source in page.evaluate(READ_SOURCES, "y")]
     for name in ("friction_coefficient", "log10_slip_rate"):
-        assert motion[name].values[thin_curve(motion[name].values)].tolist() in curves
+        assert (
+            motion[name].values[choose_drawn_point_indices(motion[name].values)].tolist() in curves
+        )
     found = run_code(page)
     np.testing.assert_array_equal(found["motion"]["slip"], motion["slip"])
     wait_for_setting(page, "cell", 13)

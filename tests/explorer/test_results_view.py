@@ -7,14 +7,14 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.explorer.result_arrays import (
-    curves_of_panel,
-    find_marks,
-    map_of_panel,
-    sample_map,
-    thin_curve,
-    to_plain_text,
+    choose_drawn_point_indices,
+    convert_mathtext_to_unicode,
+    extract_curves_of_panel,
+    extract_map_of_panel,
+    find_cells_to_mark,
+    sample_map_at_pixels,
 )
-from rsfstudy.explorer.result_cells import recompute
+from rsfstudy.explorer.result_cells import recompute_cell_and_motion
 from rsfstudy.explorer.result_selections import complete_selection
 from rsfstudy.explorer.results_view import ResultsView
 from rsfstudy.measures import VelocityStep
@@ -46,33 +46,33 @@ def test_selections_resolve_contradictions(results):
 )
 def test_an_invalid_state_is_refused(results, setting, message):
     with pytest.raises(InvalidValue, match=message):
-        ResultsView(results).set_state(setting)
+        ResultsView(results).set_widget_state(setting)
 
 
 def test_curves_have_errors_statuses_and_cells(results):
     panel = complete_selection(results, second="law", points={"stiffness_ratio": 1})
-    for law, curve in enumerate(curves_of_panel(results, panel)):
+    for law, curve in enumerate(extract_curves_of_panel(results, panel)):
         part = results.isel(law=law, stiffness_ratio=1)
-        assert curve.name == ["slip law", "slowness law"][law]
-        assert curve.cells.tolist() == [8 * law + 4 + place for place in range(4)]
+        assert curve.label == ["slip law", "slowness law"][law]
+        assert curve.cell_numbers.tolist() == [8 * law + 4 + place for place in range(4)]
         np.testing.assert_array_equal(curve.y, part[VARIABLE])
-        np.testing.assert_array_equal(curve.error, part[f"{VARIABLE}_error"])
-        np.testing.assert_array_equal(curve.status, part["status"])
+        np.testing.assert_array_equal(curve.y_error, part[f"{VARIABLE}_error"])
+        np.testing.assert_array_equal(curve.status_codes, part["status"])
 
 
 def test_a_map_finds_the_cell_at_a_position(results):
     chosen = complete_selection(results.isel(b_over_a=[2, 0, 3, 1]), kind="map", x="b_over_a")
-    found = map_of_panel(results.isel(b_over_a=[2, 0, 3, 1]), chosen)
+    found = extract_map_of_panel(results.isel(b_over_a=[2, 0, 3, 1]), chosen)
     assert found.x.tolist() == [1.5, 2.0, 3.0, 4.0]
-    assert found.cell_at(1.6, 1.19) == 5  # the second point of the dataset is b/a = 1.5
-    assert found.cell_at(9.0, 1.19) == -1
-    image = sample_map(found, (1.25, 4.5), (1.05, 1.25), (2, 13))
+    assert found.find_cell_number_at(1.6, 1.19) == 5  # the second point of the dataset is b/a = 1.5
+    assert found.find_cell_number_at(9.0, 1.19) == -1
+    image = sample_map_at_pixels(found, (1.25, 4.5), (1.05, 1.25), (2, 13))
     np.testing.assert_array_equal(image[:, [0, 3, 12]], found.values[:, [0, 1, 3]])
 
 
 def test_a_cell_of_a_part_of_the_results_is_refused(results):
     with pytest.raises(DataError, match="law has 2 points in the declaration, but 1"):
-        recompute(results.isel(law=[1]), 1, lambda *_progress: None)
+        recompute_cell_and_motion(results.isel(law=[1]), 1, lambda *_progress: None)
 
 
 def test_a_recorded_motion_is_shown():
@@ -81,34 +81,34 @@ def test_a_recorded_motion_is_shown():
     scene = Scene(normal_stress="constant", stiffness_ratio=5.0)
     study = Study(name="steps", title="Steps", base=scene, axes=axes, measure=measure)
     steps = rsfstudy.run(study, workers=0, output=None, progress=False, rtol=1e-4)
-    cell = recompute(steps, 1, lambda *_progress: None)
+    cell = recompute_cell_and_motion(steps, 1, lambda *_progress: None)
     np.testing.assert_array_equal(
         cell.motion["friction_coefficient"],
         steps["friction_coefficient"].isel({axes[0].dimension: 1}),
     )
     view = ResultsView(steps)
-    view.set_state({"variable": "friction_coefficient", "x": "load_point_displacement"})
-    assert view.python_code().startswith("import rsfstudy")
-    (_first, second) = curves_of_panel(steps, view.selection)
+    view.set_widget_state({"variable": "friction_coefficient", "x": "load_point_displacement"})
+    assert view.write_python_code().startswith("import rsfstudy")
+    (_first, second) = extract_curves_of_panel(steps, view.selection)
     np.testing.assert_array_equal(second.x, steps["load_point_displacement"].values[1])
-    assert len(view.figure().axes) == 1
+    assert len(view.draw_figure_for_download().axes) == 1
 
 
 def test_a_single_failed_cell_among_a_million_is_found():
     status = np.zeros((1000, 1000), dtype=np.int8)
     status[:500] = int(Status.STABLE_FOR_ALL_STEPS)
     status[123, 456] = int(Status.CELL_RAISED)
-    marks = find_marks(status, np.arange(10**6).reshape(1000, 1000))
-    failed = marks.status == int(Status.CELL_RAISED)
-    assert marks.cells[failed].tolist() == [123_456]
-    assert (marks.rows[failed].item(), marks.columns[failed].item()) == (123, 456)
+    marks = find_cells_to_mark(status, np.arange(10**6).reshape(1000, 1000))
+    failed = marks.status_codes == int(Status.CELL_RAISED)
+    assert marks.cell_numbers[failed].tolist() == [123_456]
+    assert (marks.row_indices[failed].item(), marks.column_indices[failed].item()) == (123, 456)
     assert 0 < (~failed).sum() <= 2500
 
 
 def test_a_long_curve_keeps_extremes_and_failed_cells():
     values, status = np.sin(np.arange(10**6)), np.zeros(10**6, dtype=np.int8)
     values[654_321], values[777_777], status[999_000] = 9.0, -9.0, int(Status.WORKER_LOST)
-    kept = thin_curve(values, status)
+    kept = choose_drawn_point_indices(values, status)
     assert {0, 654_321, 777_777, 999_000, 999_999} <= {*kept.tolist()}
     assert kept.size <= 4000
 
@@ -122,4 +122,4 @@ def test_a_long_curve_keeps_extremes_and_failed_cells():
     ],
 )
 def test_labels_without_mathtext(label, text):
-    assert to_plain_text(label) == text
+    assert convert_mathtext_to_unicode(label) == text

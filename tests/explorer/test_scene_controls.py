@@ -10,16 +10,16 @@ import pytest
 
 import rsfstudy
 from rsfstudy.explorer.field_widgets import SliderRange
-from rsfstudy.explorer.jobs import Jobs
+from rsfstudy.explorer.jobs import BackgroundJobs
 from rsfstudy.explorer.scene_controls import SceneControls
-from rsfstudy.explorer.scene_presets import PRESETS
-from rsfstudy.explorer.scene_settings import README_RIG, SceneSettings
+from rsfstudy.explorer.scene_presets import SETTINGS_BY_PRESET_LABEL
+from rsfstudy.explorer.scene_settings import README_RIG_QUANTITIES, SceneSettings
 from rsfstudy.slider import SceneFields
 
 #: Settings with which every part can be combined.
 SETTINGS = SceneSettings({"law": "slip", "normal_stress": "imposed"})
-RIG_SETTINGS = SceneSettings({"law": "slip", "normal_stress": "imposed"}, README_RIG)
-SLOTS = {slot.name: slot for slot in SceneFields.SLOTS}
+RIG_SETTINGS = SceneSettings({"law": "slip", "normal_stress": "imposed"}, README_RIG_QUANTITIES)
+SLOTS = {slot.name: slot for slot in SceneFields.PART_SLOTS}
 
 
 def choose(controls, slot, name):
@@ -60,10 +60,10 @@ def test_a_protocol_can_be_chosen_and_left(settings):
     assert controls.settings == settings
 
 
-@pytest.mark.parametrize("label", PRESETS)
+@pytest.mark.parametrize("label", SETTINGS_BY_PRESET_LABEL)
 def test_presets_survive_state_and_units(label):
-    preset = PRESETS[label]
-    assert SceneSettings.from_state(preset.as_state()) == preset
+    preset = SETTINGS_BY_PRESET_LABEL[label]
+    assert SceneSettings.from_widget_state(preset.as_widget_state()) == preset
     scene = preset.build_scene(preset.build_rig())
     assert SceneSettings.from_scene(scene).build_scene(None) == scene
     if preset.rig:
@@ -93,7 +93,7 @@ def test_user_defined_parts_have_widgets():
     sliders = {row.objects[0].label: row for row in rows if isinstance(row, pn.Row)}
     sliders["healing_power"].objects[1].value = 4.0
     assert scene_of(controls) == scene.with_(healing_power=4.0)
-    assert "law=ExplorerLaw" in settings.python_code()
+    assert "law=ExplorerLaw" in settings.write_python_code()
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_user_defined_parts_have_widgets():
 )
 def test_a_wrong_state_is_refused(state, message):
     with pytest.raises(rsfstudy.errors.InvalidValue, match=message):
-        SceneSettings.from_state(state)
+        SceneSettings.from_widget_state(state)
 
 
 def test_a_notebook_gets_a_panel_object():
@@ -121,11 +121,11 @@ def test_a_notebook_gets_a_panel_object():
 @pytest.mark.parametrize(
     ("limits", "value"),
     [
-        (SliderRange.of_field(0.01, 0.01, "must be greater than 0", ""), 0.0123),
-        (SliderRange.of_field(0.0, 100.0, "must be 0 or greater", "D_c/V_*"), 7.0),
-        (SliderRange.of_field(0.0, 1.0, "", "D_c"), -0.5),
-        (SliderRange.of_field(2.0, 2.0, "", ""), 1.4),
-        (SliderRange.of_field(0.5, 0.5, "must lie between 0 and 1", ""), 0.25),
+        (SliderRange.choose_for_field(0.01, 0.01, "must be greater than 0", ""), 0.0123),
+        (SliderRange.choose_for_field(0.0, 100.0, "must be 0 or greater", "D_c/V_*"), 7.0),
+        (SliderRange.choose_for_field(0.0, 1.0, "", "D_c"), -0.5),
+        (SliderRange.choose_for_field(2.0, 2.0, "", ""), 1.4),
+        (SliderRange.choose_for_field(0.5, 0.5, "must lie between 0 and 1", ""), 0.25),
     ],
 )
 def test_a_slider_covers_its_range(limits, value):
@@ -147,7 +147,7 @@ def wait_until(condition):
 
 def test_the_last_of_several_jobs_delivers():
     """A job that waits is replaced, and the result of an outdated job is discarded."""
-    jobs, results, may_end = Jobs(lambda messages: None), [], threading.Event()
+    jobs, results, may_end = BackgroundJobs(lambda messages: None), [], threading.Event()
 
     def compute(number):
         may_end.wait(30)
@@ -161,7 +161,7 @@ def test_the_last_of_several_jobs_delivers():
 
 
 def test_a_cancelled_job_ends_and_delivers_nothing():
-    jobs, results, started = Jobs(lambda messages: None), [], threading.Event()
+    jobs, results, started = BackgroundJobs(lambda messages: None), [], threading.Event()
 
     def compute(report):
         started.set()
@@ -170,13 +170,13 @@ def test_a_cancelled_job_ends_and_delivers_nothing():
 
     jobs.start(compute, results.append, results.append, label="long")
     started.wait(30)
-    jobs.cancel()
+    jobs.cancel_all()
     wait_until(lambda: not jobs.is_running)
     assert (results, jobs.indicator.visible) == ([], False)
 
 
 def test_errors_of_a_job_reach_the_page():
-    jobs, failures, error = Jobs(lambda messages: None), [], ValueError("wrong")
+    jobs, failures, error = BackgroundJobs(lambda messages: None), [], ValueError("wrong")
 
     def compute(_report):
         raise error

@@ -14,7 +14,7 @@ from playwright.sync_api import expect
 from study_runs import call_main
 
 import rsfstudy
-from rsfstudy.explorer.scene_presets import PRESETS
+from rsfstudy.explorer.scene_presets import SETTINGS_BY_PRESET_LABEL
 from rsfstudy.explorer.scene_settings import SceneSettings
 
 #: Script that returns a column of the motion from the plots of a page.
@@ -43,7 +43,7 @@ def page(shared_page):
 
 def choose_preset(page, label):
     """Choose a preset, and wait until the page shows the motion of the preset."""
-    text = json.dumps(PRESETS[label].as_state(), separators=(",", ":"))
+    text = json.dumps(SETTINGS_BY_PRESET_LABEL[label].as_widget_state(), separators=(",", ":"))
     if text_of(page, "State") != text:
         page.get_by_label("Preset").select_option(label)
     expect(page.get_by_label("State", exact=True)).to_have_value(text, timeout=PATIENCE)
@@ -55,7 +55,7 @@ def slider(page, name):
 
 
 def settings_of(page):
-    return SceneSettings.from_state(json.loads(text_of(page, "State")))
+    return SceneSettings.from_widget_state(json.loads(text_of(page, "State")))
 
 
 def read_motion(path):
@@ -97,7 +97,7 @@ def wait_for_change(page, action):
 
 def test_the_first_page_shows_the_rig_of_the_readme(shared_page):
     assert shared_page.url.partition("?")[0].count("token") == 0
-    assert_page_shows(shared_page, next(iter(PRESETS.values())))
+    assert_page_shows(shared_page, next(iter(SETTINGS_BY_PRESET_LABEL.values())))
 
 
 def test_a_slider_changes_the_curve(page):
@@ -106,7 +106,7 @@ def test_a_slider_changes_the_curve(page):
     wait_for_change(page, lambda: page.keyboard.press("ArrowRight"))
     after = settings_of(page)
     assert after.scene["b_over_a"] > before.scene["b_over_a"]
-    assert after == before.with_field("b_over_a", after.scene["b_over_a"])
+    assert after == before.with_changed_field("b_over_a", after.scene["b_over_a"])
     assert_page_shows(page, after)
 
 
@@ -119,7 +119,7 @@ def test_a_bookmark_opens_an_independent_tab(page):
     assert settings_of(other) == first
     slider(page, "a").focus()
     wait_for_change(page, lambda: page.keyboard.press("ArrowLeft"))
-    assert settings_of(page) == first.with_field("a", settings_of(page).scene["a"])
+    assert settings_of(page) == first.with_changed_field("a", settings_of(page).scene["a"])
     assert_page_shows(other, first)
     other.close()
 

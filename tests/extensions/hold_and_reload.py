@@ -41,7 +41,7 @@ class PeakAfterRest(Measure):
 
     def read(self, scene, integrator):
         motion = integrator.follow(scene, [maximum("spring_stress")])
-        reload = next(event for event in motion if event.kind is EventKind.SEGMENT)
+        reload = next(event for event in motion if event.kind is EventKind.SEGMENT_START)
         peak = next(event for event in motion if event.kind is EventKind.MAXIMUM)
         return reload.point.spring_stress, peak.point.spring_stress
 

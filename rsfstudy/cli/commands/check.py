@@ -10,9 +10,14 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.command_group import OptionsObjectCommand
 from rsfstudy.cli.printing import print_line
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.cli.results import (
+    EXIT_STATUS_FAILED,
+    EXIT_STATUS_OK,
+    CommandResult,
+    print_result_as_text_or_json,
+)
 from rsfstudy.errors import InvalidValue
 
 if TYPE_CHECKING:
@@ -22,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Check(CommandResult):
+class CheckCommandResult(CommandResult):
     """Comparison of study results with published values.
 
     Parameters
@@ -40,11 +45,11 @@ class Check(CommandResult):
         Names of the studies that have no results and are not in ``skipped``.
     """
 
-    studies: Sequence[StudyResults]
+    study_results: Sequence[StudyResults]
     verdicts: pd.DataFrame | None
-    unapplied_claims: Sequence[str] = ()
-    skipped: Mapping[str, str] = field(default_factory=dict)
-    not_run: Sequence[str] = ()
+    inapplicable_claim_ids: Sequence[str] = ()
+    skip_reason_by_study: Mapping[str, str] = field(default_factory=dict)
+    study_names_without_results: Sequence[str] = ()
 
     @property
     def exit_status(self) -> int:
@@ -54,28 +59,33 @@ class Check(CommandResult):
         study or a claim was not checked.
         """
         changed = self.verdicts is not None and bool(self.verdicts["verdict_changed"].any())
-        complete = all(one.is_complete for one in self.studies)
-        failed = changed or not complete or self.unapplied_claims or self.not_run
+        complete = all(one.is_complete_without_failures for one in self.study_results)
+        failed = (
+            changed
+            or not complete
+            or self.inapplicable_claim_ids
+            or self.study_names_without_results
+        )
         return EXIT_STATUS_FAILED if failed else EXIT_STATUS_OK
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
         from rsfstudy.cli.study_results import verdicts_to_json
 
-        only = self.studies[0].name if len(self.studies) == 1 else ""
+        only = self.study_results[0].study_name if len(self.study_results) == 1 else ""
         claims = [] if self.verdicts is None else verdicts_to_json(self.verdicts, only)
         return {
-            "studies": [one.json_fields() for one in self.studies],
+            "studies": [one.to_json_fields() for one in self.study_results],
             "claims": claims,
-            "unapplied_claims": self.unapplied_claims,
-            "skipped": self.skipped,
-            "not_run": self.not_run,
+            "unapplied_claims": self.inapplicable_claim_ids,
+            "skipped": self.skip_reason_by_study,
+            "not_run": self.study_names_without_results,
         }
 
 
-@click.command(cls=Command)
+@click.command(cls=OptionsObjectCommand)
 @options.study_name_or_all_argument
-@options.output_option
+@options.output_directory_option
 @click.option(
     "--claim",
     "claims",
@@ -90,35 +100,41 @@ def check(given: options.CommandOptions) -> int:
     NAME is the name of a study, or a results file. The exit status is 1 if a verdict differs from
     the expected verdict, if a cell failed, or if no claim applies to the results.
     """
-    return output_result(_check_studies(given), _print_check, given.as_json)
+    return print_result_as_text_or_json(_check_studies(given), _print_check_result, given.as_json)
 
 
-def _check_studies(given: options.CommandOptions) -> Check:
+def _check_studies(command_options: options.CommandOptions) -> CheckCommandResult:
     """Read the results of the requested studies, and check their claims."""
-    from rsfstudy.api import find_results
+    from rsfstudy.api import find_results_file
     from rsfstudy.cli.cost_estimates import describe_missing_engine_packages
-    from rsfstudy.cli.study_options import selected_study_names
+    from rsfstudy.cli.study_options import list_selected_study_names
     from rsfstudy.cli.study_results import StudyResults, collect_verdicts
     from rsfstudy.study import Claim, load_study
 
     studies, skipped, not_run = [], {}, []
-    for name in selected_study_names(given):
-        if not given.every or (given.output / f"{name}.nc").exists():
-            dataset = rsfstudy.open(name, given.output)
-            studies.append(StudyResults(dataset, str(find_results(name, given.output))))
+    for name in list_selected_study_names(command_options):
+        if not command_options.every or (command_options.output / f"{name}.nc").exists():
+            dataset = rsfstudy.open(name, command_options.output)
+            studies.append(
+                StudyResults(dataset, str(find_results_file(name, command_options.output)))
+            )
         elif why := describe_missing_engine_packages(load_study(name).accuracy.engine):
             skipped[name] = why
         else:
             not_run.append(name)
     if not studies:
-        return Check([], None, (), skipped, not_run)
-    verdicts = _select_claims(collect_verdicts(studies), given.claims)
+        return CheckCommandResult([], None, (), skipped, not_run)
+    verdicts = _select_verdicts_of_claims(collect_verdicts(studies), command_options.claims)
     others = verdicts["id"][verdicts["verdict"] == Claim.NOT_APPLICABLE]
-    unapplied = list(dict.fromkeys(others)) if given.claims or len(others) == len(verdicts) else []
-    return Check(studies, verdicts, unapplied, skipped, not_run)
+    unapplied = (
+        list(dict.fromkeys(others))
+        if command_options.claims or len(others) == len(verdicts)
+        else []
+    )
+    return CheckCommandResult(studies, verdicts, unapplied, skipped, not_run)
 
 
-def _select_claims(verdicts: pd.DataFrame, claim_ids: Sequence[str]) -> pd.DataFrame:
+def _select_verdicts_of_claims(verdicts: pd.DataFrame, claim_ids: Sequence[str]) -> pd.DataFrame:
     """Return the verdicts on the requested claims. By default, return all verdicts."""
     for claim in claim_ids:
         if claim not in (choices := list(dict.fromkeys(verdicts["id"]))):
@@ -126,21 +142,21 @@ def _select_claims(verdicts: pd.DataFrame, claim_ids: Sequence[str]) -> pd.DataF
     return verdicts[verdicts["id"].isin(claim_ids)] if claim_ids else verdicts
 
 
-def _print_check(result: Check) -> None:
+def _print_check_result(result: CheckCommandResult) -> None:
     """Print the verdicts and the failed cells."""
-    from rsfstudy.cli.study_results import print_failures, print_study_name, print_verdicts
+    from rsfstudy.cli.study_results import print_failed_cells, print_study_heading, print_verdicts
 
-    for name, reason in result.skipped.items():
+    for name, reason in result.skip_reason_by_study.items():
         print_line(f"{name}: skipped: {reason}", style="yellow")
-    for name in result.not_run:
+    for name in result.study_names_without_results:
         print_line(f"{name}: not run yet", style="red")
     if result.verdicts is None:
         return
-    if len(result.studies) == 1:
-        print_study_name(result.studies[0])
+    if len(result.study_results) == 1:
+        print_study_heading(result.study_results[0])
     print_verdicts(result.verdicts)
-    for one in result.studies:
-        print_failures(one, with_commands=False)
-    if result.unapplied_claims:
+    for one in result.study_results:
+        print_failed_cells(one, with_rerun_commands=False)
+    if result.inapplicable_claim_ids:
         text = "not checked, because they do not apply to these results"
-        print_line(f"{text}: {', '.join(result.unapplied_claims)}", style="red")
+        print_line(f"{text}: {', '.join(result.inapplicable_claim_ids)}", style="red")

@@ -11,16 +11,21 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
-from rsfstudy.cli.printing import print_line, print_pieces
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
+from rsfstudy.cli.results import (
+    EXIT_STATUS_FAILED,
+    EXIT_STATUS_OK,
+    CommandResult,
+    print_result_as_text_or_json,
+)
 from rsfstudy.errors import shorten_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from rsfstudy.reporting import TextTable
-    from rsfstudy.storage import Comparison
+    from rsfstudy.storage import ResultsComparison
 
 #: Maximum number of cells in the printed table of different statuses, and maximum length of a
 #: printed value in characters.
@@ -28,7 +33,7 @@ _MAX_DIFFERING_CELLS, _MAX_VALUE_CHARACTERS = 10, 60
 
 
 @dataclass(frozen=True)
-class FileComparison(CommandResult):
+class CompareCommandResult(CommandResult):
     """Comparison of two results files.
 
     Parameters
@@ -41,9 +46,9 @@ class FileComparison(CommandResult):
         Differences between the files.
     """
 
-    files: Sequence[Path]
+    results_files: Sequence[Path]
     provenance: Sequence[Mapping[str, Any]]
-    differences: Comparison
+    differences: ResultsComparison
 
     @property
     def exit_status(self) -> int:
@@ -51,19 +56,21 @@ class FileComparison(CommandResult):
         return EXIT_STATUS_OK if self.differences.agrees else EXIT_STATUS_FAILED
 
     @property
-    def verdict(self) -> str:
+    def summary_sentence(self) -> str:
         """Sentence that summarises the comparison."""
         found = self.differences
         if not found.finished_cell_counts[0]:
             return "nothing to compare, because the files have no finished cell in common"
         wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
         if len(found.statuses):
-            from rsfstudy.formatting import pluralize
+            from rsfstudy.formatting import format_count_with_noun
 
-            wrong.append(f"{pluralize(len(found.statuses), 'cell')} with different statuses")
+            wrong.append(
+                f"{format_count_with_noun(len(found.statuses), 'cell')} with different statuses"
+            )
         return "; ".join(wrong) or "nothing differs beyond error estimates"
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
         found = self.differences
         both, first, second = found.finished_cell_counts
@@ -72,13 +79,13 @@ class FileComparison(CommandResult):
         return {
             "files": [
                 {"file": file, "time": about["time"], "command_line": about["command"]}
-                for file, about in zip(self.files, self.provenance, strict=True)
+                for file, about in zip(self.results_files, self.provenance, strict=True)
             ],
             "agrees": found.agrees,
-            "verdict": self.verdict,
+            "verdict": self.summary_sentence,
             "cells": {"both": both, "first_only": first, "second_only": second},
-            "declaration": _list_differences(found.declaration),
-            "provenance": _list_differences(found.origin),
+            "declaration": _differences_to_json(found.declaration),
+            "provenance": _differences_to_json(found.origin),
             "axes": [
                 {"dimension": name, "first_only": first, "second_only": second}
                 for name, (first, second) in found.differing_axis_points.items()
@@ -92,15 +99,15 @@ class FileComparison(CommandResult):
         }
 
 
-def _list_differences(differences: Mapping[str, tuple[Any, Any]]) -> list[dict[str, Any]]:
+def _differences_to_json(differences: Mapping[str, tuple[Any, Any]]) -> list[dict[str, Any]]:
     """Convert differences to a list of entries for the JSON output."""
     return [{"name": n, "first": a, "second": b} for n, (a, b) in differences.items()]
 
 
-@click.command(cls=Command)
+@click.command(cls=OptionsObjectCommand)
 @click.argument("first")
 @click.argument("second")
-@options.output_option
+@options.output_directory_option
 @options.json_option
 def compare(given: options.CommandOptions) -> int:
     """Compare the declarations, versions and numbers of two results files.
@@ -110,48 +117,54 @@ def compare(given: options.CommandOptions) -> int:
     error estimates. The exit status is 0 if all numbers and statuses agree. The exit status is 1 if
     a number or a status differs, or if the files have no cell in common.
     """
-    from rsfstudy.api import find_results
+    from rsfstudy.api import find_results_file
     from rsfstudy.storage import StoredDataset
 
-    files = [find_results(name, given.output) for name in (given.first, given.second)]
+    files = [find_results_file(name, given.output) for name in (given.first, given.second)]
     datasets = [rsfstudy.open(file) for file in files]
-    result = FileComparison(
+    result = CompareCommandResult(
         files, [StoredDataset(one).provenance for one in datasets], rsfstudy.compare(*datasets)
     )
-    return output_result(result, _print_comparison, given.as_json)
+    return print_result_as_text_or_json(result, _print_file_comparison, given.as_json)
 
 
-def _print_comparison(result: FileComparison) -> None:
+def _print_file_comparison(result: CompareCommandResult) -> None:
     """Print the files, the differences and the verdict."""
-    from rsfstudy.cli.agreement_tables import build_agreement_table
-    from rsfstudy.formatting import format_list, pluralize
+    from rsfstudy.cli.agreement_tables import build_dataset_agreement_table
+    from rsfstudy.formatting import format_count_with_noun, format_list
 
     found = result.differences
-    for letter, file, about in zip("AB", result.files, result.provenance, strict=True):
+    for letter, file, about in zip("AB", result.results_files, result.provenance, strict=True):
         print_line(f"{letter}: {file}, {about['time']}, {about['command']}")
-    print_pieces([_differences_table("declaration", found.declaration)])
-    print_pieces([_differences_table("provenance", found.origin)])
+    print_tables_and_sentences([_build_differences_table("declaration", found.declaration)])
+    print_tables_and_sentences([_build_differences_table("provenance", found.origin)])
     both, first, second = found.finished_cell_counts
-    print_line(f"{pluralize(both, 'cell')} in both, {first:,} only in A, {second:,} only in B")
+    print_line(
+        f"{format_count_with_noun(both, 'cell')} in both, {first:,} only in A, {second:,} only in B"
+    )
     for axis, alone in found.differing_axis_points.items():
         for letter, points in zip("AB", alone, strict=True):
             if points:
                 print_line(f"{axis} only in {letter} ({len(points)}): {format_list(points)}")
-    print_pieces([_statuses_table(found.statuses)])
+    print_tables_and_sentences([_build_differing_statuses_table(found.statuses)])
     if len(found.statuses) > _MAX_DIFFERING_CELLS:
         print_line(f"and {len(found.statuses) - _MAX_DIFFERING_CELLS} more cells")
-    print_pieces([build_agreement_table(_rows_with_differences(found.agreement_table))])
-    for line in _uncompared_lines(found.uncompared_variables):
+    print_tables_and_sentences(
+        [build_dataset_agreement_table(_select_rows_with_differences(found.agreement_table))]
+    )
+    for line in _describe_uncompared_variables(found.uncompared_variables):
         print_line(line)
-    print_line(result.verdict, style="green" if found.agrees else "red")
+    print_line(result.summary_sentence, style="green" if found.agrees else "red")
 
 
-def _differences_table(title: str, differences: Mapping[str, tuple[Any, Any]]) -> TextTable:
+def _build_differences_table(
+    section_name: str, differences: Mapping[str, tuple[Any, Any]]
+) -> TextTable:
     """Return a table of the entries that differ between the files."""
     from rsfstudy.formatting import format_value
     from rsfstudy.reporting import TextTable
 
-    headings = f"difference in {title}", "A", "B"
+    headings = f"difference in {section_name}", "A", "B"
     rows = [
         (name, *(shorten_text(format_value(v), _MAX_VALUE_CHARACTERS) for v in pair))
         for name, pair in differences.items()
@@ -159,7 +172,7 @@ def _differences_table(title: str, differences: Mapping[str, tuple[Any, Any]]) -
     return TextTable([dict(zip(headings, row, strict=True)) for row in rows], "", headings)
 
 
-def _statuses_table(differing_statuses: pd.DataFrame) -> TextTable:
+def _build_differing_statuses_table(differing_statuses: pd.DataFrame) -> TextTable:
     """Return a table of the first cells that have different statuses."""
     from rsfstudy.formatting import format_nonempty_fields
     from rsfstudy.reporting import TextTable
@@ -177,7 +190,7 @@ def _statuses_table(differing_statuses: pd.DataFrame) -> TextTable:
     return TextTable(rows, "", {"cell"})
 
 
-def _rows_with_differences(agreement_table: pd.DataFrame) -> pd.DataFrame:
+def _select_rows_with_differences(agreement_table: pd.DataFrame) -> pd.DataFrame:
     """Select the rows with different values or with error estimates."""
     from rsfstudy.vocabulary import find_coverage_content_type
 
@@ -186,7 +199,7 @@ def _rows_with_differences(agreement_table: pd.DataFrame) -> pd.DataFrame:
     return agreement_table[is_result & (differs | agreement_table["beyond_errors"].notna())]
 
 
-def _uncompared_lines(uncompared_variables: Mapping[str, str]) -> Iterator[str]:
+def _describe_uncompared_variables(uncompared_variables: Mapping[str, str]) -> Iterator[str]:
     """Yield one line of text for each reason why variables are not compared."""
     for why in dict.fromkeys(uncompared_variables.values()):
         names = [name for name, reason in uncompared_variables.items() if reason == why]

@@ -11,21 +11,21 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
-from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.record_options import (
-    collect_reading_options,
+    collect_record_reading_options,
     make_quantity_option,
-    reading_options,
+    record_reading_options,
 )
-from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult, print_result_as_text_or_json
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 @dataclass(frozen=True)
-class RecordEvents(CommandResult):
+class EventsCommandResult(CommandResult):
     """Stress drops in records.
 
     Parameters
@@ -36,25 +36,29 @@ class RecordEvents(CommandResult):
         Stress drops in each record.
     """
 
-    files: Sequence[Path]
-    catalogues: Sequence[xr.Dataset]
+    record_files: Sequence[Path]
+    event_catalogues: Sequence[xr.Dataset]
 
     @property
     def exit_status(self) -> int:
         """Return the exit status for success, even if a record has no events."""
         return EXIT_STATUS_OK
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        from rsfstudy.reporting import list_record_events
+        from rsfstudy.reporting import summarise_record_events_as_fields
 
-        pairs = zip(self.files, self.catalogues, strict=True)
-        return {"records": [{"file": file, **list_record_events(of)} for file, of in pairs]}
+        pairs = zip(self.record_files, self.event_catalogues, strict=True)
+        return {
+            "records": [
+                {"file": file, **summarise_record_events_as_fields(of)} for file, of in pairs
+            ]
+        }
 
 
-@click.command(cls=Command)
-@click.argument("records", nargs=-1, required=True, type=options.FilePath())
-@reading_options
+@click.command(cls=OptionsObjectCommand)
+@click.argument("records", nargs=-1, required=True, type=options.PathParameterType())
+@record_reading_options
 @make_quantity_option(
     "--stiffness",
     "Stiffness between the fault and the displacement sensor. If the record contains fault "
@@ -75,20 +79,22 @@ def events(given: options.CommandOptions) -> int:
     smallest detectable drop, and a table with the times, durations, intervals and sizes of the
     drops. With --json, the command prints all quantities with their errors.
     """
-    reading = collect_reading_options(given)
+    reading = collect_record_reading_options(given)
     sign = None if given.sign is None else int(given.sign)
     catalogues = [
         rsfstudy.events(path, stiffness=given.stiffness, sign=sign, **reading)
         for path in given.records
     ]
-    return output_result(RecordEvents(given.records, catalogues), _print_events, given.as_json)
+    return print_result_as_text_or_json(
+        EventsCommandResult(given.records, catalogues), _print_events, given.as_json
+    )
 
 
-def _print_events(result: RecordEvents) -> None:
+def _print_events(result: EventsCommandResult) -> None:
     """Print a table of the drops in each record."""
-    from rsfstudy.reporting import build_record_events_pieces
+    from rsfstudy.reporting import build_record_events_tables_and_sentences
 
-    for file, catalogue in zip(result.files, result.catalogues, strict=True):
-        if len(result.files) > 1:
+    for file, catalogue in zip(result.record_files, result.event_catalogues, strict=True):
+        if len(result.record_files) > 1:
             print_line(str(file), style="bold", soft_wrap=True)
-        print_pieces(build_record_events_pieces(catalogue))
+        print_tables_and_sentences(build_record_events_tables_and_sentences(catalogue))

@@ -7,14 +7,14 @@ import sys
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.command_group import OptionsObjectCommand
 from rsfstudy.cli.printing import print_line
 from rsfstudy.cli.results import EXIT_STATUS_OK
 from rsfstudy.errors import SignalInterrupt
 
 
-@click.command(cls=Command)
-@click.argument("file", required=False, type=options.FilePath(exists=True))
+@click.command(cls=OptionsObjectCommand)
+@click.argument("file", required=False, type=options.PathParameterType(exists=True))
 @click.option(
     "--state",
     metavar="SETTINGS",
@@ -46,7 +46,7 @@ def explore(given: options.CommandOptions) -> int:
             given.state,
             port=given.port,
             open_browser=not given.no_browser,
-            announce=_announce,
+            announce_address=_print_page_address,
         )
     except SignalInterrupt:
         raise
@@ -55,7 +55,7 @@ def explore(given: options.CommandOptions) -> int:
     return EXIT_STATUS_OK
 
 
-def _announce(url: str) -> None:
+def _print_page_address(url: str) -> None:
     """Print the first address of the page."""
     print_line(f"{url}\nThe page is open until you press Ctrl-C.", soft_wrap=True)
     sys.stdout.flush()

@@ -7,16 +7,16 @@ import os
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.command_group import OptionsObjectCommand
 from rsfstudy.cli.printing import print_line
 from rsfstudy.cli.results import EXIT_STATUS_OK
 from rsfstudy.errors import DataError, InvalidValue
 
-_UNIT_OPTION_NAMES = ("stress", "length", "time")
+_QUANTITIES_OF_UNITS_OPTION = ("stress", "length", "time")
 
 
-@click.command(cls=Command)
-@click.argument("file", type=options.FilePath())
+@click.command(cls=OptionsObjectCommand)
+@click.argument("file", type=options.PathParameterType())
 @click.option("--csv", is_flag=True, help="Write a CSV table. Constant columns are omitted.")
 @click.option("--mat", is_flag=True, help="Write all variables to a MATLAB file.")
 @click.option(
@@ -28,7 +28,7 @@ _UNIT_OPTION_NAMES = ("stress", "length", "time")
 )
 @click.option(
     "--output",
-    type=options.FilePath(dir_okay=False),
+    type=options.PathParameterType(dir_okay=False),
     help="Output path. The suffix is replaced by .csv or .mat.  [default: path of FILE with "
     "the new suffix]",
 )
@@ -53,7 +53,9 @@ def export(given: options.CommandOptions) -> int:
             remedy = "Choose another path."
             raise InvalidValue("--output", str(path), "already exists", remedy=remedy)
     if given.units:
-        dataset = dataset.rsf.in_units(**dict(zip(_UNIT_OPTION_NAMES, given.units, strict=True)))
+        dataset = dataset.rsf.in_units(
+            **dict(zip(_QUANTITIES_OF_UNITS_OPTION, given.units, strict=True))
+        )
     for ending, path in paths.items():
         try:
             writers[ending](dataset, path)

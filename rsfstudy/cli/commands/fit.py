@@ -11,15 +11,20 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.command_group import OptionsObjectCommand
 from rsfstudy.cli.options import DecoratedFunction
-from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.record_options import (
-    collect_reading_options,
+    collect_record_reading_options,
     make_quantity_option,
-    reading_options,
+    record_reading_options,
 )
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.cli.results import (
+    EXIT_STATUS_FAILED,
+    EXIT_STATUS_OK,
+    CommandResult,
+    print_result_as_text_or_json,
+)
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import Engine
@@ -30,7 +35,7 @@ if TYPE_CHECKING:
     from rsfstudy.fitting import LoadingStep, Record
 
 #: Maximum number of steps that are printed for each record.
-_MAX_LISTED_STEPS = 24
+_MAX_PRINTED_LOADING_STEPS = 24
 #: Names of the options whose values are passed to ``rsfstudy.fit`` unchanged.
 _OPTIONS_PASSED_TO_FIT = (
     "stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
@@ -39,7 +44,7 @@ _OPTIONS_PASSED_TO_FIT = (
 
 
 @dataclass(frozen=True)
-class RecordFits(CommandResult):
+class FitCommandResult(CommandResult):
     """Output of the ``fit`` command: records and their fits.
 
     Parameters
@@ -53,19 +58,19 @@ class RecordFits(CommandResult):
     """
 
     records: Sequence[Record]
-    dataset: xr.Dataset
-    files: Sequence[Path]
+    fit_dataset: xr.Dataset
+    output_files: Sequence[Path]
 
     @property
     def exit_status(self) -> int:
         """Exit status. The status is 1 if a fit has no values or no valid errors."""
-        from rsfstudy.reporting import all_fits_are_valid
+        from rsfstudy.reporting import are_all_fits_valid
 
-        return EXIT_STATUS_OK if all_fits_are_valid(self.dataset) else EXIT_STATUS_FAILED
+        return EXIT_STATUS_OK if are_all_fits_valid(self.fit_dataset) else EXIT_STATUS_FAILED
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        from rsfstudy.reporting import list_fit_values
+        from rsfstudy.reporting import summarise_fits_as_fields
 
         return {
             "records": [
@@ -73,22 +78,24 @@ class RecordFits(CommandResult):
                     "record": record.name,
                     "rows": len(record),
                     "processing": record.processing,
-                    "steps": [_step_to_json(*step) for step in enumerate(record.loading_steps, 1)],
+                    "steps": [
+                        _loading_step_to_json(*step) for step in enumerate(record.loading_steps, 1)
+                    ],
                 }
                 for record in self.records
             ],
-            "fits": list_fit_values(self.dataset),
-            "files": self.files,
+            "fits": summarise_fits_as_fields(self.fit_dataset),
+            "files": self.output_files,
         }
 
 
-def _step_to_json(number: int, step: LoadingStep) -> dict[str, Any]:
+def _loading_step_to_json(step_number: int, loading_step: LoadingStep) -> dict[str, Any]:
     """Return the JSON entry of a step. The units are s, um/s and Pa."""
     names = "start", "end", "velocity_before", "velocity_after", "stress_before", "stress_after"
-    return {"step": number, **{name: getattr(step, name) for name in names}}
+    return {"step": step_number, **{name: getattr(loading_step, name) for name in names}}
 
 
-def _split_commas(
+def _split_comma_separated_list(
     _context: click.Context, _option: click.Parameter, text: str | None
 ) -> tuple[str, ...]:
     """Split a comma-separated list."""
@@ -100,13 +107,17 @@ def _make_comma_list_option(
 ) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option for a comma-separated list."""
     return click.option(
-        *option_names, callback=_split_commas, default=default, metavar=metavar, help=help_text
+        *option_names,
+        callback=_split_comma_separated_list,
+        default=default,
+        metavar=metavar,
+        help=help_text,
     )
 
 
-@click.command(cls=Command)
-@click.argument("records", nargs=-1, required=True, type=options.FilePath())
-@reading_options
+@click.command(cls=OptionsObjectCommand)
+@click.argument("records", nargs=-1, required=True, type=options.PathParameterType())
+@record_reading_options
 @make_quantity_option(
     "--stiffness",
     "Stiffness of the machine, optionally divided by the normal stress. To estimate "
@@ -214,8 +225,8 @@ def _make_comma_list_option(
     Path("fit.png"),
     "Figure path. The data are written to a NetCDF file in the same directory.",
 )
-@options.style_options
-@options.header_option
+@options.figure_style_options
+@options.figure_header_option
 @options.quiet_option
 @options.json_option
 def fit(given: options.CommandOptions) -> int:
@@ -229,26 +240,26 @@ def fit(given: options.CommandOptions) -> int:
     errors are not valid. The exit status is 2 if the command line is invalid. Otherwise the exit
     status is 0, even if a parameter is not identified.
     """
-    from rsfstudy.api import STIFFNESS_FROM_RECORD
+    from rsfstudy.api import STIFFNESS_OPTION_FROM_RECORD
     from rsfstudy.cli.data_files import check_output_may_be_replaced
-    from rsfstudy.reporting import is_fit
+    from rsfstudy.reporting import contains_fits
 
     data = given.output.with_suffix(".nc")
-    check_output_may_be_replaced(data, is_fit, "fit")
-    about = collect_reading_options(given)
-    if given.stiffness != STIFFNESS_FROM_RECORD:
+    check_output_may_be_replaced(data, contains_fits, "fit")
+    about = collect_record_reading_options(given)
+    if given.stiffness != STIFFNESS_OPTION_FROM_RECORD:
         about["stiffness"] = given.stiffness
     records = [rsfstudy.read_record(path, **about) for path in given.records]
     if not given.as_json:
         for record in records:
-            _print_steps(record)
+            _print_loading_steps(record)
     dataset = _fit_and_write_files(records, data, given)
-    result = RecordFits(records, dataset, [given.output, data])
-    return output_result(result, _print_fits, given.as_json)
+    result = FitCommandResult(records, dataset, [given.output, data])
+    return print_result_as_text_or_json(result, _print_fits, given.as_json)
 
 
 def _fit_and_write_files(
-    records: Sequence[Record], data_path: Path, given: options.CommandOptions
+    records: Sequence[Record], data_path: Path, command_options: options.CommandOptions
 ) -> xr.Dataset:
     """Fit the records, and write the figure and the data."""
     from rsfstudy.cli.assignment_parsing import parse_scene_field_assignments
@@ -257,15 +268,15 @@ def _fit_and_write_files(
 
     dataset = rsfstudy.fit(
         records,
-        steps=[_parse_step_number(text) for text in given.steps],
-        progress=not given.quiet,
-        command=given.command_line,
-        **given.collect_option_values(*_OPTIONS_PASSED_TO_FIT),
-        **parse_scene_field_assignments(given.settings),
+        steps=[_parse_step_number(text) for text in command_options.steps],
+        progress=not command_options.quiet,
+        command=command_options.command_line,
+        **command_options.collect_option_values(*_OPTIONS_PASSED_TO_FIT),
+        **parse_scene_field_assignments(command_options.settings),
     )
     dataset = write_dataset(dataset, data_path)
-    appearance = given.collect_option_values("style", "width", "header")
-    save_figure(dataset, given.output, **appearance)
+    appearance = command_options.collect_option_values("style", "width", "header")
+    save_figure(dataset, command_options.output, **appearance)
     return dataset
 
 
@@ -277,15 +288,15 @@ def _parse_step_number(text: str) -> int:
     return int(text)
 
 
-def _print_fits(result: RecordFits) -> None:
+def _print_fits(result: FitCommandResult) -> None:
     """Print the parameters of the fits, and the files."""
     from rsfstudy.reporting import build_summary_tables_and_sentences
 
-    print_pieces(build_summary_tables_and_sentences(result.dataset))
-    print_line(f"wrote {' and '.join(map(str, result.files))}", soft_wrap=True)
+    print_tables_and_sentences(build_summary_tables_and_sentences(result.fit_dataset))
+    print_line(f"wrote {' and '.join(map(str, result.output_files))}", soft_wrap=True)
 
 
-def _print_steps(record: Record) -> None:
+def _print_loading_steps(record: Record) -> None:
     """Print the steps of a record."""
     from rsfstudy.reporting import TextTable
 
@@ -300,10 +311,10 @@ def _print_steps(record: Record) -> None:
             "V1 (um/s)": f"{step.velocity_after:.6g}",
             **_format_normal_stresses_of_step(step, stressed),
         }
-        for number, step in enumerate(record.loading_steps[:_MAX_LISTED_STEPS], start=1)
+        for number, step in enumerate(record.loading_steps[:_MAX_PRINTED_LOADING_STEPS], start=1)
     ]
-    print_pieces([TextTable(rows)])
-    if (left := len(record.loading_steps) - _MAX_LISTED_STEPS) > 0:
+    print_tables_and_sentences([TextTable(rows)])
+    if (left := len(record.loading_steps) - _MAX_PRINTED_LOADING_STEPS) > 0:
         print_line(f"and {left} more steps")
 
 

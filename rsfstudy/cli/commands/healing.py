@@ -12,10 +12,15 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
-from rsfstudy.cli.printing import print_line, print_pieces
-from rsfstudy.cli.record_options import collect_reading_options, reading_options
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
+from rsfstudy.cli.record_options import collect_record_reading_options, record_reading_options
+from rsfstudy.cli.results import (
+    EXIT_STATUS_FAILED,
+    EXIT_STATUS_OK,
+    CommandResult,
+    print_result_as_text_or_json,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class HealingResult(CommandResult):
+class HealingCommandResult(CommandResult):
     """Healing in the holds of a record.
 
     Parameters
@@ -40,35 +45,35 @@ class HealingResult(CommandResult):
     """
 
     record: Record
-    table: xr.Dataset
-    stiffness: xr.Dataset
-    files: Sequence[Path]
+    hold_table: xr.Dataset
+    machine_stiffness: xr.Dataset
+    output_files: Sequence[Path]
 
     @property
     def exit_status(self) -> int:
         """Return a failure status if no hold has a friction peak on reloading."""
-        has_peak = bool(self.table["healing"].notnull().any())
+        has_peak = bool(self.hold_table["healing"].notnull().any())
         return EXIT_STATUS_OK if has_peak else EXIT_STATUS_FAILED
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        per_hold = [str(name) for name in self.table.variables if self.table[name].dims]
+        per_hold = [str(name) for name in self.hold_table.variables if self.hold_table[name].dims]
         return {
             "record": self.record.name,
             "rows": len(self.record),
             "holds": [
-                {name: self.table[name][number].item() for name in per_hold}
-                for number in range(self.table.sizes["hold"])
+                {name: self.hold_table[name][number].item() for name in per_hold}
+                for number in range(self.hold_table.sizes["hold"])
             ],
-            **{str(n): of.item() for n, of in self.table.data_vars.items() if not of.dims},
-            **{n: self.stiffness[n].item() for n in ("stiffness", "stiffness_stderr")},
-            "files": self.files,
+            **{str(n): of.item() for n, of in self.hold_table.data_vars.items() if not of.dims},
+            **{n: self.machine_stiffness[n].item() for n in ("stiffness", "stiffness_stderr")},
+            "files": self.output_files,
         }
 
 
-@click.command(cls=Command)
-@click.argument("record", type=options.FilePath())
-@reading_options
+@click.command(cls=OptionsObjectCommand)
+@click.argument("record", type=options.PathParameterType())
+@record_reading_options
 @click.option(
     "--stiffness",
     help="Stiffness of the machine. This option is required if the record contains fault slip "
@@ -79,7 +84,7 @@ class HealingResult(CommandResult):
     Path("healing.png"),
     "Figure path. The data are written to a NetCDF file in the same directory.",
 )
-@options.style_options
+@options.figure_style_options
 @options.json_option
 def healing(given: options.CommandOptions) -> int:
     """Measure frictional healing in the holds of RECORD.
@@ -94,29 +99,31 @@ def healing(given: options.CommandOptions) -> int:
     """
     from rsfstudy.cli.data_files import check_output_may_be_replaced
     from rsfstudy.cli.figure_files import write_figure
-    from rsfstudy.execution import provenance_attributes
+    from rsfstudy.execution import build_provenance_attributes
     from rsfstudy.reporting import is_hold_table
     from rsfstudy.storage import write_dataset
 
     data = given.output.with_suffix(".nc")
     check_output_may_be_replaced(data, is_hold_table, "table of holds")
-    about = {"stiffness": given.stiffness, **collect_reading_options(given)}
+    about = {"stiffness": given.stiffness, **collect_record_reading_options(given)}
     record = rsfstudy.read_record(given.record, **about)
-    table = rsfstudy.healing(record).assign_attrs(provenance_attributes(given.command_line))
+    table = rsfstudy.healing(record).assign_attrs(build_provenance_attributes(given.command_line))
     write_dataset(table, data)
     appearance = given.collect_option_values("style", "width")
     write_figure(rsfstudy.plot_healing(table, record, **appearance), given.output, given.style)
-    result = HealingResult(record, table, record.stiffness(), [given.output, data])
-    return output_result(result, _print_healing, given.as_json)
+    result = HealingCommandResult(record, table, record.stiffness(), [given.output, data])
+    return print_result_as_text_or_json(result, _print_healing, given.as_json)
 
 
-def _print_healing(result: HealingResult) -> None:
+def _print_healing(result: HealingCommandResult) -> None:
     """Print the table of holds, the healing rate and the stiffness."""
-    from rsfstudy.reporting import format_with_error, summarise_holds
+    from rsfstudy.reporting import format_value_with_stderr, summarise_holds
 
     print_line(f"{result.record.name}: {len(result.record):,} rows")
-    print_pieces(summarise_holds(result.table))
-    value, stderr = (result.stiffness[n].item() for n in ("stiffness", "stiffness_stderr"))
+    print_tables_and_sentences(summarise_holds(result.hold_table))
+    value, stderr = (result.machine_stiffness[n].item() for n in ("stiffness", "stiffness_stderr"))
     if math.isfinite(value):
-        print_line(f"stiffness divided by normal stress: {format_with_error(value, stderr)} 1/um")
-    print_line(f"wrote {' and '.join(map(str, result.files))}", soft_wrap=True)
+        print_line(
+            f"stiffness divided by normal stress: {format_value_with_stderr(value, stderr)} 1/um"
+        )
+    print_line(f"wrote {' and '.join(map(str, result.output_files))}", soft_wrap=True)

@@ -9,34 +9,38 @@ from typing import Any
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
-from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult, output_result
-from rsfstudy.study import study_titles
+from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult, print_result_as_text_or_json
+from rsfstudy.study import read_study_titles
 
 
 @dataclass(frozen=True)
-class StudyList(CommandResult):
+class ListStudiesCommandResult(CommandResult):
     """Output of the ``list`` command: names and titles of the named studies."""
 
-    titles: Mapping[str, str]
+    title_by_study: Mapping[str, str]
     exit_status = EXIT_STATUS_OK
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        return {"studies": [{"name": n, "title": title} for n, title in self.titles.items()]}
+        return {
+            "studies": [{"name": n, "title": title} for n, title in self.title_by_study.items()]
+        }
 
 
-@click.command("list", cls=Command)
+@click.command("list", cls=OptionsObjectCommand)
 @options.json_option
 def list_studies(given: options.CommandOptions) -> int:
     """List all studies with their titles."""
-    return output_result(StudyList(study_titles()), _print_titles, given.as_json)
+    return print_result_as_text_or_json(
+        ListStudiesCommandResult(read_study_titles()), _print_study_titles, given.as_json
+    )
 
 
-def _print_titles(result: StudyList) -> None:
+def _print_study_titles(result: ListStudiesCommandResult) -> None:
     """Print one line per study."""
     text = click.get_current_context().make_formatter()
-    text.write_dl(list(result.titles.items()))
+    text.write_dl(list(result.title_by_study.items()))
     text.write_paragraph()
     text.write_text(
         "Use rsfstudy show NAME for the details of a study, and rsfstudy run NAME to compute the "

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.command_group import OptionsObjectCommand
 from rsfstudy.cli.printing import print_line
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.defaults import Defaults
@@ -15,7 +15,7 @@ from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
 
 
-@click.command(cls=Command)
+@click.command(cls=OptionsObjectCommand)
 @options.study_name_or_all_argument
 @options.make_output_option(
     "Directory that contains the results and receives the figure, or path of a single figure. "
@@ -37,54 +37,64 @@ def plot(given: options.CommandOptions) -> int:
     command writes the figure to the directory of the file. If the study defines its own figure,
     pass the Python file of the study with --study. The Python file is executed.
     """
-    from rsfstudy.api import find_results
-    from rsfstudy.cli.figure_files import default_figure_path
-    from rsfstudy.cli.study_options import selected_study_names
+    from rsfstudy.api import find_results_file
+    from rsfstudy.cli.figure_files import build_default_figure_path
+    from rsfstudy.cli.study_options import list_selected_study_names
 
-    status, target = EXIT_STATUS_OK, _figure_path_from_output_option(given)
-    for name in selected_study_names(given):
-        results = find_results(name, Defaults.OUTPUT_DIRECTORY if target else given.output)
+    status, target = EXIT_STATUS_OK, _find_figure_path_in_output_option(given)
+    for name in list_selected_study_names(given):
+        results = find_results_file(name, Defaults.OUTPUT_DIRECTORY if target else given.output)
         beside = results if given.output is None else given.output / results.name
-        drawn = _draw_figure(results, target or default_figure_path(beside, given), given)
+        drawn = _draw_figure(results, target or build_default_figure_path(beside, given), given)
         status = status if drawn else EXIT_STATUS_FAILED
         for file in drawn:
             print_line(f"{file}")
     return status
 
 
-def _draw_figure(results: Path, figure_path: Path, given: options.CommandOptions) -> list[Path]:
+def _draw_figure(
+    results: Path, figure_path: Path, command_options: options.CommandOptions
+) -> list[Path]:
     """Draw the figure of a results file, and return the paths of the new files."""
     from rsfstudy.cli import figure_files
     from rsfstudy.cli.study_options import read_results_file
     from rsfstudy.storage import StoredDataset
 
-    dataset = read_results_file(results, given.study)
+    dataset = read_results_file(results, command_options.study)
     if StoredDataset(dataset).is_of_single_scene:
-        if given.variable is not None:
+        if command_options.variable is not None:
             rule = "applies only to results of a study, but the file contains a motion"
-            raise InvalidValue("--variable", given.variable, rule, remedy="Use --against.")
-        appearance = given.collect_option_values("against", "style", "width", "header")
-        figure_files.write_figure(dataset.rsf.plot(**appearance), figure_path, given.style)
+            raise InvalidValue(
+                "--variable", command_options.variable, rule, remedy="Use --against."
+            )
+        appearance = command_options.collect_option_values("against", "style", "width", "header")
+        figure_files.write_figure(
+            dataset.rsf.plot(**appearance), figure_path, command_options.style
+        )
         return [figure_path]
-    if given.against is not None:
+    if command_options.against is not None:
         rule = "applies only to a motion, but the file contains results of a study"
-        raise InvalidValue("--against", given.against, rule, remedy="Use --variable.")
-    own = None if given.variable else figure_files.load_user_figure_or_default(dataset, given.study)
-    return figure_files.draw_and_save_figure(dataset, figure_path, given, own)
+        raise InvalidValue("--against", command_options.against, rule, remedy="Use --variable.")
+    own = (
+        None
+        if command_options.variable
+        else figure_files.load_user_figure_or_default(dataset, command_options.study)
+    )
+    return figure_files.draw_and_save_figure(dataset, figure_path, command_options, own)
 
 
-def _figure_path_from_output_option(given: options.CommandOptions) -> Path | None:
+def _find_figure_path_in_output_option(command_options: options.CommandOptions) -> Path | None:
     """Return the value of ``--output`` if it is the path of a figure file.
 
     If the value is a directory, the function returns None. If the value has a suffix that is not a
     figure format, the value must be an existing directory.
     """
-    output: Path | None = given.output
+    output: Path | None = command_options.output
     ending = "" if output is None else output.suffix[1:].lower()
     if output is None or not ending:
         return None
     if ending in Defaults.FIGURE_FORMATS:
-        if given.every or given.form not in (None, ending):
+        if command_options.every or command_options.form not in (None, ending):
             rule = "is the path of a single figure. Omit --all and --figure, or pass a directory."
             raise click.UsageError(f"{output} {rule}")
         check_regular_file("--output", output)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.command_group import OptionsObjectCommand
 from rsfstudy.cli.printing import print_line
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.defaults import Defaults
 
 
-@click.command(cls=Command)
-@click.argument("directory", default=Defaults.OUTPUT_DIRECTORY, type=options.FilePath())
+@click.command(cls=OptionsObjectCommand)
+@click.argument("directory", default=Defaults.OUTPUT_DIRECTORY, type=options.PathParameterType())
 @click.option(
     "--output",
-    type=options.FilePath(dir_okay=False),
+    type=options.PathParameterType(dir_okay=False),
     metavar="FILE",
     help="Path of the HTML page.  [default: DIRECTORY/report.html]",
 )
@@ -26,9 +26,9 @@ def report(given: options.CommandOptions) -> int:
     provenance. The page is a single file that can be viewed in a browser or printed. The exit
     status is 1 if a results file cannot be read. In this case, the page shows the reason.
     """
-    from rsfstudy.api import write_report
+    from rsfstudy.api import write_html_report
 
-    page, unread = write_report(given.directory, given.output)
+    page, unread = write_html_report(given.directory, given.output)
     print_line(f"wrote {page}", soft_wrap=True)
     for file in unread:
         text = f"{file} cannot be read (see the page for the reason)"

@@ -11,8 +11,8 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
-from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.errors import RsfStudyError
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from rsfstudy.measures import Outcome
 
 
-@click.command(cls=Command)
-@click.argument("file", type=options.FilePath())
+@click.command(cls=OptionsObjectCommand)
+@click.argument("file", type=options.PathParameterType())
 @click.option(
     "--cell",
     "place",
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @options.make_output_option(
     "Directory for the recomputed results.  [default: no file is written]", file_okay=False
 )
-@options.worker_options
+@options.worker_pool_options
 def rerun(given: options.CommandOptions) -> int:
     """Recompute the results in a file, and compare both results.
 
@@ -48,7 +48,7 @@ def rerun(given: options.CommandOptions) -> int:
     from rsfstudy.cli.study_options import open_worker_pool
 
     if given.place:
-        return _recompute_cell(given)
+        return _recompute_and_print_cell(given)
     with open_worker_pool(given) as where:
         asked = given.collect_option_values("study", "output", "time_limit")
         agreement = rsfstudy.rerun(
@@ -58,47 +58,49 @@ def rerun(given: options.CommandOptions) -> int:
             progress=not given.quiet,
             **asked,
         )
-    _print_agreement(agreement)
-    return EXIT_STATUS_OK if _is_identical(agreement) else EXIT_STATUS_FAILED
+    _print_agreement_with_file(agreement)
+    return EXIT_STATUS_OK if _are_all_values_identical(agreement) else EXIT_STATUS_FAILED
 
 
-def _is_identical(agreement: pd.DataFrame) -> bool:
+def _are_all_values_identical(agreement_by_variable: pd.DataFrame) -> bool:
     """Return True if there are numbers to compare and all of them are identical."""
-    values = agreement["values"]
-    return bool(values.sum()) and bool((values == agreement["identical"]).all())
+    values = agreement_by_variable["values"]
+    return bool(values.sum()) and bool((values == agreement_by_variable["identical"]).all())
 
 
-def _print_agreement(agreement: pd.DataFrame) -> None:
+def _print_agreement_with_file(agreement_by_variable: pd.DataFrame) -> None:
     """Print the agreement of the recomputed results with the results file."""
-    from rsfstudy.cli.agreement_tables import build_agreement_table
+    from rsfstudy.cli.agreement_tables import build_dataset_agreement_table
 
-    for name, (in_file, now) in agreement.attrs["differs"].items():
+    for name, (in_file, now) in agreement_by_variable.attrs["differs"].items():
         print_line(f"{name}: {in_file} in the file, {now} now", style="yellow")
-    print_pieces([build_agreement_table(agreement)])
-    if not agreement["values"].sum():
+    print_tables_and_sentences([build_dataset_agreement_table(agreement_by_variable)])
+    if not agreement_by_variable["values"].sum():
         print_line("nothing to compare, because the file contains no finished cell")
     else:
-        same = _is_identical(agreement)
+        same = _are_all_values_identical(agreement_by_variable)
         print_line("all numbers are identical" if same else "some numbers differ")
 
 
-def _recompute_cell(given: options.CommandOptions) -> int:
+def _recompute_and_print_cell(command_options: options.CommandOptions) -> int:
     """Recompute one cell, and print the new values next to the stored values."""
     import numpy as np
 
     from rsfstudy.cli import assignment_parsing
     from rsfstudy.storage import find_cell_number
 
-    place = dict(map(assignment_parsing.parse_cell_coordinate, given.place))
+    place = dict(map(assignment_parsing.parse_cell_coordinate, command_options.place))
     try:
         with warnings.catch_warnings(record=True, action="always") as caught:
-            scene, outcome = rsfstudy.recompute_cell(given.file, place, study=given.study)
+            scene, outcome = rsfstudy.recompute_cell(
+                command_options.file, place, study=command_options.study
+            )
     except RsfStudyError:
         raise
     except Exception:  # The traceback helps to debug the cell.
         traceback.print_exc()
         return EXIT_STATUS_FAILED
-    results = rsfstudy.open(given.file)
+    results = rsfstudy.open(command_options.file)
     index = np.unravel_index(find_cell_number(results, place), results["status"].shape)
     stored = results.isel(dict(zip(results["status"].dims, index, strict=True)))
     for one in caught:
@@ -126,17 +128,21 @@ def print_recomputed_cell(scene: Scene, outcome: Outcome, stored_values: xr.Data
     from rsfstudy.reporting import TextTable
 
     print_line(f"{format_nonempty_fields(scene.as_dict())}\n")
-    print_pieces([TextTable(_rows_of_cell(outcome.values, stored_values))])
+    print_tables_and_sentences(
+        [TextTable(_build_cell_comparison_rows(outcome.values, stored_values))]
+    )
     text = f"{outcome.status.label}{': ' * bool(outcome.message)}{outcome.message}"
     print_line(f"{text} ({outcome.rhs_evaluations:,} right-hand-side evaluations)")
 
 
-def _rows_of_cell(values: Mapping[str, Any], stored_values: xr.Dataset) -> Sequence[dict[str, str]]:
+def _build_cell_comparison_rows(
+    recomputed_values: Mapping[str, Any], stored_values: xr.Dataset
+) -> Sequence[dict[str, str]]:
     """Return one table row per number, with the new value and the stored value."""
     import numpy as np
 
     rows = []
-    for name, value in values.items():
+    for name, value in recomputed_values.items():
         same = np.array_equal(value, stored_values[name], equal_nan=True)
         now = _format_number_or_array(value)
         stored = "same" if same else _format_number_or_array(stored_values[name])

@@ -11,9 +11,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
-from rsfstudy.cli.printing import print_line, print_note, print_pieces
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.printing import print_line, print_on_stderr, print_tables_and_sentences
+from rsfstudy.cli.results import (
+    EXIT_STATUS_FAILED,
+    EXIT_STATUS_OK,
+    CommandResult,
+    print_result_as_text_or_json,
+)
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import Interrupted, RsfStudyError
 
@@ -28,7 +33,7 @@ _FILE_SUFFIX_BY_FORMAT = {"netcdf": "nc", "zarr": "zarr"}
 
 
 @dataclass(frozen=True)
-class StudyRun:
+class StudyRunOutcome:
     """Outcome of the run of one study.
 
     Parameters
@@ -49,65 +54,67 @@ class StudyRun:
         Reason why the study was skipped, or error that ended the run.
     """
 
-    study: str
-    seconds: float | None = None
+    study_name: str
+    elapsed_seconds: float | None = None
     results: StudyResults | None = None
     verdicts: pd.DataFrame | None = None
-    problems: Sequence[str] = ()
-    files: Sequence[Path] = ()
-    message: str = ""
+    failure_descriptions: Sequence[str] = ()
+    output_files: Sequence[Path] = ()
+    reason_for_missing_results: str = ""
 
     @property
-    def outcome(self) -> str:
+    def outcome_label(self) -> str:
         """Label of the outcome: "ok", "failed", "skipped" or "not_finished"."""
-        if self.seconds is None:
+        if self.elapsed_seconds is None:
             return "skipped"
         if self.results is None:
             return "not_finished"
-        return "failed" if self.problems else "ok"
+        return "failed" if self.failure_descriptions else "ok"
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output that describe the run of one study."""
         from rsfstudy.cli.study_results import verdicts_to_json
 
-        claims = [] if self.verdicts is None else verdicts_to_json(self.verdicts, self.study)
+        claims = [] if self.verdicts is None else verdicts_to_json(self.verdicts, self.study_name)
         return {
-            "study": self.study,
-            "outcome": self.outcome,
-            "message": self.message,
-            "problems": self.problems,
-            "seconds": self.seconds,
-            "files": self.files,
-            "results": None if self.results is None else self.results.json_fields(),
+            "study": self.study_name,
+            "outcome": self.outcome_label,
+            "message": self.reason_for_missing_results,
+            "problems": self.failure_descriptions,
+            "seconds": self.elapsed_seconds,
+            "files": self.output_files,
+            "results": None if self.results is None else self.results.to_json_fields(),
             "claims": claims,
         }
 
 
 @dataclass(frozen=True)
-class Runs(CommandResult):
+class RunCommandResult(CommandResult):
     """Output of the ``run`` command: outcomes of one or more studies."""
 
-    studies: Sequence[StudyRun]
+    study_run_outcomes: Sequence[StudyRunOutcome]
 
     @property
     def exit_status(self) -> int:
         """Exit status. The status is 1 if a run failed or did not finish."""
-        failed = any(one.outcome in ("failed", "not_finished") for one in self.studies)
+        failed = any(
+            one.outcome_label in ("failed", "not_finished") for one in self.study_run_outcomes
+        )
         return EXIT_STATUS_FAILED if failed else EXIT_STATUS_OK
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        return {"studies": [one.json_fields() for one in self.studies]}
+        return {"studies": [one.to_json_fields() for one in self.study_run_outcomes]}
 
 
-@click.command(cls=Command)
+@click.command(cls=OptionsObjectCommand)
 @options.study_name_or_all_argument
-@options.set_values_option
-@options.output_option
+@options.set_axis_values_option
+@options.output_directory_option
 @options.rtol_option
 @options.engine_option
-@options.budget_option
-@options.worker_options
+@options.evaluation_budget_option
+@options.worker_pool_options
 @click.option("--fresh", is_flag=True, help="Recompute all cells, including finished cells.")
 @click.option(
     "--keep-going",
@@ -134,46 +141,54 @@ def run(given: options.CommandOptions) -> int:
     results OUTPUT/NAME.nc and the figure OUTPUT/NAME.png, and prints the reductions and the claims.
     To continue an interrupted run, enter the same command again. Finished cells are not recomputed.
     """
-    from rsfstudy.api import prepare_run_with_progress
+    from rsfstudy.api import make_run_function_with_progress
     from rsfstudy.cli.study_options import (
         build_study_from_options,
+        list_selected_study_names,
         open_worker_pool,
-        selected_study_names,
     )
     from rsfstudy.execution import OutputOptions
 
-    studies = [build_study_from_options(name, given) for name in selected_study_names(given)]
-    skipped = _skip_studies_without_engine(studies) if given.every and given.engine is None else []
+    studies = [build_study_from_options(name, given) for name in list_selected_study_names(given)]
+    skipped = (
+        _find_studies_with_missing_engine(studies) if given.every and given.engine is None else []
+    )
     if not given.as_json:
         for one in skipped:
-            print_line(f"{one.study}: skipped: {one.message}", style="yellow")
-    studies = [study for study in studies if study.name not in {one.study for one in skipped}]
+            print_line(
+                f"{one.study_name}: skipped: {one.reason_for_missing_results}", style="yellow"
+            )
+    studies = [study for study in studies if study.name not in {one.study_name for one in skipped}]
     kept = given.collect_option_values(
         "output", "format", "fresh", "keep_going", "despite_failures", "command_line"
     )
     with open_worker_pool(given, given.output / "workers.log" if given.every else None) as where:
         ready = [
-            (s, prepare_run_with_progress(s, OutputOptions(**kept), where, not given.quiet))
+            (s, make_run_function_with_progress(s, OutputOptions(**kept), where, not given.quiet))
             for s in studies
         ]
         for study in studies:
             _print_expected_cost(study, given)
         if not given.every:
-            return output_result(
-                Runs([_run_study(*ready[0], given)]), _print_nothing, given.as_json
+            return print_result_as_text_or_json(
+                RunCommandResult([_run_study(*ready[0], given)]), _print_nothing, given.as_json
             )
         return _run_studies_in_turn(ready, given, skipped)
 
 
-def _skip_studies_without_engine(studies: Sequence[Study]) -> list[StudyRun]:
+def _find_studies_with_missing_engine(studies: Sequence[Study]) -> list[StudyRunOutcome]:
     """Return the studies whose engine is not installed."""
     from rsfstudy.cli.cost_estimates import describe_missing_engine_packages
 
     missing = {s.name: describe_missing_engine_packages(s.accuracy.engine) for s in studies}
-    return [StudyRun(name, message=why) for name, why in missing.items() if why]
+    return [
+        StudyRunOutcome(name, reason_for_missing_results=why)
+        for name, why in missing.items()
+        if why
+    ]
 
 
-def _print_expected_cost(study: Study, given: options.CommandOptions) -> None:
+def _print_expected_cost(study: Study, command_options: options.CommandOptions) -> None:
     """Print the estimated cost of a run if the user changed the accuracy.
 
     If the compiled engine would be faster, the function also recommends this engine.
@@ -183,141 +198,151 @@ def _print_expected_cost(study: Study, given: options.CommandOptions) -> None:
     from rsfstudy.motion import Accuracy
 
     plan = CellPlan(study)
-    if given.changes_accuracy and not given.as_json:
+    if command_options.is_rtol_specified and not command_options.as_json:
         ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
         words = f"{study.name}: {ratio:.2g} times the work of rtol {Accuracy.DEFAULT_RTOL:g}"
-        print_line(f"{words}, {cost_estimates.describe_study_cost(plan, given.output)}")
-    if not (given.every or given.quiet) and (
-        text := cost_estimates.compiled_engine_hint(plan, given.output)
+        print_line(f"{words}, {cost_estimates.describe_study_cost(plan, command_options.output)}")
+    if not (command_options.every or command_options.quiet) and (
+        text := cost_estimates.suggest_compiled_engine(plan, command_options.output)
     ):
-        print_note(f"note: {text}")
+        print_on_stderr(f"note: {text}")
 
 
 def _run_studies_in_turn(
     studies_with_run_functions: Sequence[tuple[Study, Callable[[], xr.Dataset]]],
-    given: options.CommandOptions,
-    skipped: Sequence[StudyRun],
+    command_options: options.CommandOptions,
+    skipped_run_outcomes: Sequence[StudyRunOutcome],
 ) -> int:
     """Run studies one after another, and continue after a failed study.
 
     After Ctrl-C or a signal, the function does not run the remaining studies. The function always
     prints a table with one row per study.
     """
-    runs: list[StudyRun] = []
+    runs: list[StudyRunOutcome] = []
     try:
         for study, compute in studies_with_run_functions:
             began = time.monotonic()
             try:
-                runs.append(_run_study(study, compute, given))
+                runs.append(_run_study(study, compute, command_options))
             except Interrupted:
                 raise
             except RsfStudyError as error:
-                print_note(f"error: {error}")
+                print_on_stderr(f"error: {error}")
                 seconds = time.monotonic() - began
-                runs.append(StudyRun(study.name, seconds, message=str(error)))
+                runs.append(
+                    StudyRunOutcome(study.name, seconds, reason_for_missing_results=str(error))
+                )
     except BaseException:
-        if not given.as_json:
-            _print_runs(Runs([*runs, *skipped]))
+        if not command_options.as_json:
+            _print_table_of_study_runs(RunCommandResult([*runs, *skipped_run_outcomes]))
         raise
-    return output_result(Runs([*runs, *skipped]), _print_runs, given.as_json)
+    return print_result_as_text_or_json(
+        RunCommandResult([*runs, *skipped_run_outcomes]),
+        _print_table_of_study_runs,
+        command_options.as_json,
+    )
 
 
 def _run_study(
-    study: Study, compute_dataset: Callable[[], xr.Dataset], given: options.CommandOptions
-) -> StudyRun:
+    study: Study, compute_dataset: Callable[[], xr.Dataset], command_options: options.CommandOptions
+) -> StudyRunOutcome:
     """Compute a study, draw its figure, and print a report.
 
     The report is short if the command runs all studies. With ``--json``, the function does not
     print a report.
     """
-    from rsfstudy.cli.figure_files import default_figure_path, draw_and_save_figure
+    from rsfstudy.cli.figure_files import build_default_figure_path, draw_and_save_figure
     from rsfstudy.cli.study_results import StudyResults
-    from rsfstudy.reporting import summarise_verdicts
+    from rsfstudy.reporting import summarise_verdicts_and_failures
 
     began = time.monotonic()
     dataset = compute_dataset()
-    file = given.output / f"{study.name}.{_FILE_SUFFIX_BY_FORMAT[given.format]}"
+    file = command_options.output / f"{study.name}.{_FILE_SUFFIX_BY_FORMAT[command_options.format]}"
     own = None if isinstance(study.plot, str) else study.plot
-    drawn = draw_and_save_figure(dataset, default_figure_path(file, given), given, own)
+    drawn = draw_and_save_figure(
+        dataset, build_default_figure_path(file, command_options), command_options, own
+    )
     results = StudyResults(dataset, str(file))
     verdicts, seconds = results.verdicts, time.monotonic() - began
-    _counts, problems = summarise_verdicts(dataset, verdicts)
+    _counts, problems = summarise_verdicts_and_failures(dataset, verdicts)
     if not drawn:
         problems.append("no figure")
-    found = StudyRun(study.name, seconds, results, verdicts, problems, [file, *drawn])
-    if not given.as_json:
-        (_print_short_report if given.every else _print_report)(found)
+    found = StudyRunOutcome(study.name, seconds, results, verdicts, problems, [file, *drawn])
+    if not command_options.as_json:
+        (_print_short_study_report if command_options.every else _print_study_report)(found)
     return found
 
 
-def _print_nothing(_runs: Runs) -> None:
+def _print_nothing(_command_result: RunCommandResult) -> None:
     """Print nothing, because the report of a single run has already been printed."""
 
 
-def _print_report(done: StudyRun) -> None:
+def _print_study_report(run_outcome: StudyRunOutcome) -> None:
     """Print reductions, claims, failed cells and output files of a run."""
-    from rsfstudy.cli.study_results import print_failures, print_study_name, print_verdicts
+    from rsfstudy.cli.study_results import print_failed_cells, print_study_heading, print_verdicts
     from rsfstudy.reporting import (
         build_reduction_tables_and_sentences,
+        describe_slow_instability_norms,
         format_status_counts,
-        note_on_norms_near_load_velocity,
     )
 
-    assert done.results is not None
-    assert done.verdicts is not None
-    dataset = done.results.dataset
-    print_pieces(build_reduction_tables_and_sentences(dataset))
-    if slow := note_on_norms_near_load_velocity(dataset):
+    assert run_outcome.results is not None
+    assert run_outcome.verdicts is not None
+    dataset = run_outcome.results.dataset
+    print_tables_and_sentences(build_reduction_tables_and_sentences(dataset))
+    if slow := describe_slow_instability_norms(dataset):
         print_line(slow, style="yellow")
-    print_study_name(done.results)
-    print_verdicts(done.verdicts)
-    print_failures(done.results)
-    print_line(f"{done.study}: {format_status_counts(dataset)}")
-    print_line(f"wrote {' and '.join(map(str, done.files))}", soft_wrap=True)
+    print_study_heading(run_outcome.results)
+    print_verdicts(run_outcome.verdicts)
+    print_failed_cells(run_outcome.results)
+    print_line(f"{run_outcome.study_name}: {format_status_counts(dataset)}")
+    print_line(f"wrote {' and '.join(map(str, run_outcome.output_files))}", soft_wrap=True)
 
 
-def _print_short_report(done: StudyRun) -> None:
+def _print_short_study_report(run_outcome: StudyRunOutcome) -> None:
     """Print a short report of a study, for a run of several studies.
 
     The report has one line for each table of the full report. Failed cells and verdicts that differ
     from the expected verdicts are listed individually.
     """
-    from rsfstudy.cli.study_results import print_failures, print_unexpected_verdicts
+    from rsfstudy.cli.study_results import print_failed_cells, print_unexpected_verdicts
     from rsfstudy.formatting import format_duration, format_overrides
-    from rsfstudy.reporting import count_verdicts, summarise_study_as_text_lines
+    from rsfstudy.reporting import format_verdict_counts, summarise_study_as_text_lines
 
-    assert done.results is not None
-    assert done.verdicts is not None
-    assert done.seconds is not None
-    dataset, overrides = done.results.dataset, done.results.overrides
-    print_line(f"{done.study}: {dataset.attrs['title']}", style="bold", soft_wrap=True)
+    assert run_outcome.results is not None
+    assert run_outcome.verdicts is not None
+    assert run_outcome.elapsed_seconds is not None
+    dataset, overrides = run_outcome.results.dataset, run_outcome.results.overrides
+    print_line(f"{run_outcome.study_name}: {dataset.attrs['title']}", style="bold", soft_wrap=True)
     for line in (
         *([f"overrides: {format_overrides(overrides)}"] if overrides else []),
         *summarise_study_as_text_lines(dataset),
-        f"claims: {count_verdicts(done.verdicts) or '-'}",
-        f"in {format_duration(done.seconds)}, wrote {' and '.join(map(str, done.files))}",
+        f"claims: {format_verdict_counts(run_outcome.verdicts) or '-'}",
+        f"in {format_duration(run_outcome.elapsed_seconds)}, wrote {' and '.join(map(str, run_outcome.output_files))}",
     ):
         print_line(f"  {line}", soft_wrap=True)
-    print_unexpected_verdicts(done.verdicts)
-    print_failures(done.results)
+    print_unexpected_verdicts(run_outcome.verdicts)
+    print_failed_cells(run_outcome.results)
 
 
-def _print_runs(runs: Runs) -> None:
+def _print_table_of_study_runs(command_result: RunCommandResult) -> None:
     """Print a table with one row per study."""
     from rsfstudy.formatting import format_duration
-    from rsfstudy.reporting import TextTable, count_verdicts
+    from rsfstudy.reporting import TextTable, format_verdict_counts
 
     colours = {"ok": "green", "skipped": "yellow"}
     texts = {"skipped": "skipped: {}", "not_finished": "not finished", "ok": "ok"}
     rows = [
         {
-            "study": one.study,
-            "time": "-" if one.seconds is None else format_duration(one.seconds),
-            "verdicts": "-" if one.verdicts is None else count_verdicts(one.verdicts) or "-",
-            "status": ", ".join(one.problems)
-            or texts[one.outcome].format(one.message.partition(" (")[0]),
+            "study": one.study_name,
+            "time": "-" if one.elapsed_seconds is None else format_duration(one.elapsed_seconds),
+            "verdicts": "-" if one.verdicts is None else format_verdict_counts(one.verdicts) or "-",
+            "status": ", ".join(one.failure_descriptions)
+            or texts[one.outcome_label].format(one.reason_for_missing_results.partition(" (")[0]),
         }
-        for one in runs.studies
+        for one in command_result.study_run_outcomes
     ]
-    row_colours = [colours.get(one.outcome, "red") for one in runs.studies]
-    print_pieces([TextTable(rows, "", {"verdicts", "status"}, row_colours)])
+    row_colours = [
+        colours.get(one.outcome_label, "red") for one in command_result.study_run_outcomes
+    ]
+    print_tables_and_sentences([TextTable(rows, "", {"verdicts", "status"}, row_colours)])

@@ -7,17 +7,17 @@ from pathlib import Path
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
-from rsfstudy.cli.results import output_result
+from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.results import print_result_as_text_or_json
 
 _SUFFIXES_OF_RESULTS_FILES = (".nc", ".zarr")
 
 
-@click.command(cls=Command)
+@click.command(cls=OptionsObjectCommand)
 @click.argument("name")
-@options.set_values_option
+@options.set_axis_values_option
 @options.rtol_option
-@options.output_option
+@options.output_directory_option
 @options.study_file_option
 @options.rig_options
 @options.json_option
@@ -37,11 +37,13 @@ def show(given: options.CommandOptions) -> int:
     if Path(given.name).suffix not in _SUFFIXES_OF_RESULTS_FILES:
         study = study_options.build_study_from_options(given.name, given)
         declared = StudyDeclaration(study, given.output)
-        return output_result(declared, print_study_declaration, given.as_json)
-    if given.settings or given.changes_accuracy or given.rig_option_texts:
+        return print_result_as_text_or_json(declared, print_study_declaration, given.as_json)
+    if given.settings or given.is_rtol_specified or given.rig_option_texts:
         rule = (
             "--set, --rtol and rig options cannot be used with a results file. Omit these options."
         )
         raise click.UsageError(rule)
     dataset = study_options.read_results_file(Path(given.name), given.study)
-    return output_result(FileSummary(dataset, given.name), print_file_summary, given.as_json)
+    return print_result_as_text_or_json(
+        FileSummary(dataset, given.name), print_file_summary, given.as_json
+    )

@@ -9,8 +9,8 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
-from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import Accuracy, Engine
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 
 
-@click.command(cls=Command)
+@click.command(cls=OptionsObjectCommand)
 @options.make_set_scene_fields_option(
     "Set a scene field. Values can have units if a rig is defined. The value of the field "
     "'loading' can be the path of a CSV file. Examples: law=slowness, hold_time='100 s' or "
@@ -35,7 +35,7 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 @click.option(
     "--protocol",
     "protocol_file",
-    type=options.FilePath(dir_okay=False),
+    type=options.PathParameterType(dir_okay=False),
     help="CSV file with the load point history. This option is equivalent to --set "
     "loading=FILE. Examples of headers: 'velocity (um/s), duration (s)' for a protocol, "
     "'time (s), displacement (um)' for a record.",
@@ -63,8 +63,8 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
     Path("motion.png"),
     "Figure path. The data are written to a NetCDF file in the same directory.",
 )
-@options.style_options
-@options.header_option
+@options.figure_style_options
+@options.figure_header_option
 @click.option("--quiet", is_flag=True, help="Print only the status. Peaks and events are omitted.")
 def simulate(given: options.CommandOptions) -> int:
     """Compute a single motion, and write its figure and its data.
@@ -76,19 +76,22 @@ def simulate(given: options.CommandOptions) -> int:
     instability norm. In this case, the exit status is 3. Otherwise the exit status is 0.
     """
     from rsfstudy.cli.data_files import check_output_may_be_replaced
-    from rsfstudy.execution import provenance_attributes
+    from rsfstudy.execution import build_provenance_attributes
     from rsfstudy.reporting import is_motion
 
     check_output_may_be_replaced(given.output.with_suffix(".nc"), is_motion, "motion")
     scene, rig = _build_scene_and_rig(given)
-    duration, accuracy = _parse_duration(given.duration, rig), ("rtol", "budget", "engine")
+    duration, accuracy = (
+        _parse_dimensionless_duration(given.duration, rig),
+        ("rtol", "budget", "engine"),
+    )
     motion = rsfstudy.simulate(scene, duration=duration, **given.collect_option_values(*accuracy))
-    motion = motion.assign_attrs(provenance_attributes(given.command_line))
+    motion = motion.assign_attrs(build_provenance_attributes(given.command_line))
     _write_motion_and_figure(motion, rig, given)
-    return _exit_status_of_motion(motion)
+    return _find_exit_status_of_motion(motion)
 
 
-def _exit_status_of_motion(motion: xr.Dataset) -> int:
+def _find_exit_status_of_motion(motion: xr.Dataset) -> int:
     """Return the exit status for a motion."""
     from rsfstudy.api import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME
 
@@ -98,23 +101,23 @@ def _exit_status_of_motion(motion: xr.Dataset) -> int:
     return _EXIT_STATUS_UNPHYSICAL_MOTION if unphysical else EXIT_STATUS_OK
 
 
-def _build_scene_and_rig(given: options.CommandOptions) -> tuple[Scene, Rig | None]:
+def _build_scene_and_rig(command_options: options.CommandOptions) -> tuple[Scene, Rig | None]:
     """Build a scene, and a rig if the options define a rig."""
     from rsfstudy.cli import assignment_parsing as parsing
 
-    fields = parsing.parse_scene_field_assignments(given.settings)
-    quantities = given.rig_option_texts
+    fields = parsing.parse_scene_field_assignments(command_options.settings)
+    quantities = command_options.rig_option_texts
     if (velocity := quantities.pop("load_velocity", None)) is not None:
         fields["load_velocity"] = parsing.parse_number_or_text(velocity)
-    rig = parsing.parse_rig(quantities) if quantities else None
-    if given.protocol_file is not None:
-        fields["loading"] = parsing.read_loading_file(given.protocol_file, rig)
+    rig = parsing.build_rig_from_options(quantities) if quantities else None
+    if command_options.protocol_file is not None:
+        fields["loading"] = parsing.read_loading_file(command_options.protocol_file, rig)
     elif "loading" in fields:
-        fields["loading"] = parsing.parse_loading_file(fields["loading"], rig)
+        fields["loading"] = parsing.read_loading_if_csv_path(fields["loading"], rig)
     return (rig.scene(**fields) if rig else rsfstudy.Scene(**fields)), rig
 
 
-def _parse_duration(text: str | None, rig: Rig | None) -> float | None:
+def _parse_dimensionless_duration(text: str | None, rig: Rig | None) -> float | None:
     """Convert a duration to units of D_c/V_*."""
     from rsfstudy.cli.assignment_parsing import parse_number_or_text
 
@@ -128,7 +131,7 @@ def _parse_duration(text: str | None, rig: Rig | None) -> float | None:
 
 
 def _write_motion_and_figure(
-    motion: xr.Dataset, rig: Rig | None, given: options.CommandOptions
+    motion: xr.Dataset, rig: Rig | None, command_options: options.CommandOptions
 ) -> None:
     """Write the figure and the data of a motion, and print a summary."""
     from rsfstudy.cli.figure_files import write_figure
@@ -141,13 +144,19 @@ def _write_motion_and_figure(
         reason = "the motion has no points, so no figure and no data are written"
         print_line(f"{status}\n{reason}")
         return
-    data = given.output.with_suffix(".nc")
+    data = command_options.output.with_suffix(".nc")
     write_dataset(rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS) if rig else motion, data)
-    appearance = given.collect_option_values("against", "style", "width", "header")
-    write_figure(rsfstudy.plot_motion(motion, rig, **appearance), given.output, given.style)
-    if not given.quiet:
+    appearance = command_options.collect_option_values("against", "style", "width", "header")
+    write_figure(
+        rsfstudy.plot_motion(motion, rig, **appearance),
+        command_options.output,
+        command_options.style,
+    )
+    if not command_options.quiet:
         found = [motion, motion.rsf.events()]
         if rig:
             found = [rig.in_units(of, **DatasetUnits.DISPLAY_UNITS) for of in found]
-        print_pieces(build_motion_tables_and_sentences(found[0], motion.rsf.scene, found[1]))
-    print_line(f"{status}\nwrote {given.output} and {data}")
+        print_tables_and_sentences(
+            build_motion_tables_and_sentences(found[0], motion.rsf.scene, found[1])
+        )
+    print_line(f"{status}\nwrote {command_options.output} and {data}")

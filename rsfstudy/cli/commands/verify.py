@@ -11,9 +11,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.command_group import OptionsObjectCommand
 from rsfstudy.cli.printing import print_line
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.cli.results import (
+    EXIT_STATUS_FAILED,
+    EXIT_STATUS_OK,
+    CommandResult,
+    print_result_as_text_or_json,
+)
 from rsfstudy.errors import InvalidValue
 
 if TYPE_CHECKING:
@@ -21,33 +26,33 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Verification(CommandResult):
+class VerifyCommandResult(CommandResult):
     """Comparison of solution files with the reference solutions."""
 
-    files: Sequence[Path]
-    comparisons: Sequence[AnswerComparison]
+    answer_files: Sequence[Path]
+    answer_comparisons: Sequence[AnswerComparison]
 
     @property
     def exit_status(self) -> int:
         """Exit status. The status is 1 if a file has too few correct digits."""
-        passed = all(one.has_required_digits for one in self.comparisons)
+        passed = all(one.has_required_digits for one in self.answer_comparisons)
         return EXIT_STATUS_OK if passed else EXIT_STATUS_FAILED
 
-    def json_fields(self) -> dict[str, Any]:
+    def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        from rsfstudy.referee import summarise_comparisons
+        from rsfstudy.referee import summarise_answer_comparisons
 
-        pairs = zip(self.files, self.comparisons, strict=True)
+        pairs = zip(self.answer_files, self.answer_comparisons, strict=True)
         return {
-            "summary": summarise_comparisons(self.comparisons),
-            "files": [_comparison_to_json(file, one) for file, one in pairs],
+            "summary": summarise_answer_comparisons(self.answer_comparisons),
+            "files": [_answer_comparison_to_json(file, one) for file, one in pairs],
         }
 
 
-def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, Any]:
+def _answer_comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, Any]:
     """Return the entry of the JSON output that describes one answer file."""
     problem = comparison.problem
-    index = problem.index_values if problem.index_column else None
+    index = problem.index_values if problem.index_column_name else None
     return {
         "file": file,
         "problem": problem.number or None,
@@ -57,12 +62,12 @@ def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, A
         "required_digits": comparison.required_digits,
         "reference_digits": problem.digits,
         "explanation": comparison.explanation_of_disagreement,
-        "index_column": problem.index_column or None,
+        "index_column": problem.index_column_name or None,
         "quantities": [
             {
                 "name": one.quantity_name,
                 "digits": one.agreeing_digits,
-                "agrees_to_written_digits": one.agrees_to_written_digits,
+                "agrees_to_written_digits": one.agrees_within_rounding_error,
                 "least_agreeing_at": None if index is None else index[one.least_agreeing_row],
                 "first_failing_at": None
                 if index is None or one.first_failing_row is None
@@ -73,8 +78,10 @@ def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, A
     }
 
 
-@click.command(cls=Command)
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.FilePath())
+@click.command(cls=OptionsObjectCommand)
+@click.argument(
+    "files", metavar="FILE...", nargs=-1, required=True, type=options.PathParameterType()
+)
 @click.option(
     "--problem",
     metavar="N|TOML",
@@ -100,7 +107,7 @@ def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, A
     "Draw a figure of the agreement between the solutions. The suffix of FILE must be "
     ".png, .pdf or .svg.",
 )
-@options.style_options
+@options.figure_style_options
 @options.json_option
 def verify(given: options.CommandOptions) -> int:
     """Compare the solutions of a different code with reference solutions.
@@ -121,17 +128,19 @@ def verify(given: options.CommandOptions) -> int:
         compare_file_with_known_answer(file, given.problem or "", columns, given.digits)
         for file in given.files
     ]
-    status = output_result(Verification(given.files, found), _print_verification, given.as_json)
+    status = print_result_as_text_or_json(
+        VerifyCommandResult(given.files, found), _print_verification, given.as_json
+    )
     if given.figure is not None:
         _write_agreement_figure(found, given)
     return status
 
 
-def _print_verification(result: Verification) -> None:
+def _print_verification(result: VerifyCommandResult) -> None:
     """Print the correct digits of each quantity, and possible explanations."""
-    from rsfstudy.referee import summarise_comparisons
+    from rsfstudy.referee import summarise_answer_comparisons
 
-    for file, one in zip(result.files, result.comparisons, strict=True):
+    for file, one in zip(result.answer_files, result.answer_comparisons, strict=True):
         problem = one.problem
         known = f"reference known to {problem.digits} digits"
         name = f"problem {problem.number}" if problem.number else known
@@ -142,11 +151,11 @@ def _print_verification(result: Verification) -> None:
         if not one.has_required_digits:
             unexplained = "no common difference in conventions explains the disagreement"
             print_line(f"  {one.explanation_of_disagreement or unexplained}")
-    print_line(summarise_comparisons(result.comparisons), style="bold")
+    print_line(summarise_answer_comparisons(result.answer_comparisons), style="bold")
 
 
 def _write_agreement_figure(
-    comparisons: Sequence[AnswerComparison], given: options.CommandOptions
+    answer_comparisons: Sequence[AnswerComparison], command_options: options.CommandOptions
 ) -> None:
     """Draw the number of agreeing digits of each quantity.
 
@@ -159,17 +168,17 @@ def _write_agreement_figure(
     from rsfstudy.plots import draw_agreement, style_context
 
     digits: dict[str, list[tuple[float, float]]] = {}
-    problem, label = comparisons[0].problem, "problem"
-    if len(comparisons) == 1 and problem.index_column:
-        label = f"{problem.index_column} ({problem.quantity_units[problem.index_column]})"
-        for one in comparisons[0].quantity_agreements:
+    problem, label = answer_comparisons[0].problem, "problem"
+    if len(answer_comparisons) == 1 and problem.index_column_name:
+        label = f"{problem.index_column_name} ({problem.quantity_units[problem.index_column_name]})"
+        for one in answer_comparisons[0].quantity_agreements:
             along = -np.log10(np.maximum(one.relative_differences, 10.0**-problem.digits))
             digits[one.quantity_name] = list(zip(problem.index_values, along, strict=True))
     else:
-        for number, comparison in enumerate(comparisons, start=1):
+        for number, comparison in enumerate(answer_comparisons, start=1):
             at = comparison.problem.number or number
             for one in comparison.quantity_agreements:
                 digits.setdefault(one.quantity_name, []).append((at, one.agreeing_digits))
-    with style_context(given.style, given.width):
-        drawn = draw_agreement(digits, label, comparisons[0].required_digits)
-    write_figure(drawn, given.figure, given.style)
+    with style_context(command_options.style, command_options.width):
+        drawn = draw_agreement(digits, label, answer_comparisons[0].required_digits)
+    write_figure(drawn, command_options.figure, command_options.style)

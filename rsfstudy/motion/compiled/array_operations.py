@@ -20,8 +20,8 @@ from numba.extending import intrinsic
 from rsfstudy.motion import array_operations, recording, steppers
 from rsfstudy.motion.recording import (
     HALF_SAMPLES,
-    INTERPOLATION_COEFFICIENTS,
-    SAMPLE_COLUMN,
+    SAMPLE_INTERPOLATION_COEFFICIENTS,
+    SAMPLE_NUMBER_COLUMN,
     SAMPLES_PER_STEP,
 )
 from rsfstudy.motion.steppers import order_eight
@@ -30,7 +30,7 @@ _NUMBA_FLOAT_POINTER_TYPE = types.CPointer(types.float64)
 #: Numba type of the function ``function(y, rates, p, result)``, whose arguments are pointers to
 #: floats.
 _LLVM_DOUBLE_POINTER_TYPE = ir.DoubleType().as_pointer()
-_LLVM_FUNCTION_TYPE = ir.FunctionType(ir.VoidType(), [_LLVM_DOUBLE_POINTER_TYPE] * 4)
+_LLVM_TYPE_OF_IN_PLACE_FUNCTION = ir.FunctionType(ir.VoidType(), [_LLVM_DOUBLE_POINTER_TYPE] * 4)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -41,14 +41,16 @@ def _call_function_at_address(
 
     def code(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         function, *pointers = arguments
-        builder.call(builder.inttoptr(function, _LLVM_FUNCTION_TYPE.as_pointer()), pointers)
+        builder.call(
+            builder.inttoptr(function, _LLVM_TYPE_OF_IN_PLACE_FUNCTION.as_pointer()), pointers
+        )
         return target.get_dummy_value()
 
     return types.void(types.int64, *[_NUMBA_FLOAT_POINTER_TYPE] * 4), code
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _array_data_pointer(_context: Any, array: Any) -> Any:
+def _get_array_data_pointer(_context: Any, array: Any) -> Any:
     """Generate code that returns a pointer to the first item of an array."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -58,7 +60,7 @@ def _array_data_pointer(_context: Any, array: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _pointer_moved_by(_context: Any, pointer: Any, item_count: Any) -> Any:
+def _advance_pointer(_context: Any, pointer: Any, item_count: Any) -> Any:
     """Generate code that moves a pointer by a number of items."""
 
     def code(_target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
@@ -83,7 +85,7 @@ def evaluate_function_into_array(function, y, rates, parameters, result):
     _call_function_at_address(function, y, rates, parameters, result)
 
 
-def array_as_pointer(array):
+def convert_array_to_pointer(array):
     """Return a pointer to the first item of an array.
 
     Parameters
@@ -96,7 +98,7 @@ def array_as_pointer(array):
     pointer
         Pointer to the first item.
     """
-    return _array_data_pointer(array)
+    return _get_array_data_pointer(array)
 
 
 def advance_pointer_by_items(pointer, item_count):
@@ -114,7 +116,7 @@ def advance_pointer_by_items(pointer, item_count):
     pointer
         Pointer to a later item.
     """
-    return _pointer_moved_by(pointer, item_count)
+    return _advance_pointer(pointer, item_count)
 
 
 def copy_values(source, target, item_count):
@@ -131,7 +133,7 @@ def copy_values(source, target, item_count):
         target[i] = source[i]
 
 
-def interpolate_rows(columns, row_positions, result):
+def interpolate_at_fractional_rows(columns, row_positions, result):
     """Interpolate columns at fractional row numbers.
 
     The result is the same as the result of ``recording.interpolate_rows``.
@@ -152,7 +154,7 @@ def interpolate_rows(columns, row_positions, result):
             result[:, i] = math.nan
             continue
         after = math.ceil(row_positions[i])
-        within = int(columns[SAMPLE_COLUMN, after])
+        within = int(columns[SAMPLE_NUMBER_COLUMN, after])
         begin = after - (within or min(after, 1))
         part = row_positions[i] - begin
         row, share = begin + int(part), part - int(part)
@@ -166,7 +168,8 @@ def interpolate_rows(columns, row_positions, result):
             weights[k] = 0.0
             for power in range(SAMPLES_PER_STEP, -1, -1):
                 weights[k] = (
-                    weights[k] * (part / HALF_SAMPLES - 1.0) + INTERPOLATION_COEFFICIENTS[power][k]
+                    weights[k] * (part / HALF_SAMPLES - 1.0)
+                    + SAMPLE_INTERPOLATION_COEFFICIENTS[power][k]
                 )
         for c in range(len(result)):
             result[c, i] = 0.0
@@ -177,11 +180,11 @@ def interpolate_rows(columns, row_positions, result):
 #: Mapping of each Python function to the function that replaces it in compiled code.
 COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION: Mapping[Any, Any] = {
     array_operations.evaluate_function_into_array: evaluate_function_into_array,
-    array_operations.array_as_pointer: array_as_pointer,
+    array_operations.convert_array_to_pointer: convert_array_to_pointer,
     array_operations.advance_pointer_by_items: advance_pointer_by_items,
     array_operations.copy_values: copy_values,
-    recording.interpolate_rows: interpolate_rows,
-    steppers.begin_regime: order_eight.begin_regime,
+    recording.interpolate_at_fractional_rows: interpolate_at_fractional_rows,
+    steppers.begin_integration_of_regime: order_eight.begin_integration_of_regime,
     steppers.attempt_step: order_eight.attempt_step,
     steppers.step_to_segment_end: order_eight.step_to_segment_end,
     steppers.interpolate_unknowns: order_eight.interpolate_unknowns,

@@ -14,14 +14,14 @@ from types import FunctionType
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.parts import Part
-from rsfstudy.slider import Function
+from rsfstudy.slider import NumericFunction
 
-_EQUATIONS_PHRASE_FOR_ERROR_MESSAGES = "the equations"
+_DEFAULT_SUBJECT_OF_ERROR_MESSAGES = "the equations"
 _NUMBA_ERROR_LOCATION_PATTERN = re.compile(r'\n+File "(?P<file>.+?)", line (?P<line>\d+)')
 
 
 def check_function_never_raises(
-    function: Function, already_checked_functions: set[Function] | None = None
+    function: NumericFunction, already_checked_functions: set[NumericFunction] | None = None
 ) -> None:
     """Raise InvalidValue if a function contains a raise statement.
 
@@ -62,7 +62,7 @@ def check_function_never_raises(
             check_function_never_raises(reached, already_checked_functions)
 
 
-def compilation_error(error: Exception) -> InvalidValue:
+def build_compilation_error(numba_error: Exception) -> InvalidValue:
     """Convert a Numba error to an error that names the part and the source line.
 
     Parameters
@@ -75,12 +75,12 @@ def compilation_error(error: Exception) -> InvalidValue:
     InvalidValue
         Error with a message for the user.
     """
-    text, what, where = str(error), _EQUATIONS_PHRASE_FOR_ERROR_MESSAGES, ""
+    text, what, where = str(numba_error), _DEFAULT_SUBJECT_OF_ERROR_MESSAGES, ""
     places = list(_NUMBA_ERROR_LOCATION_PATTERN.finditer(text))
     of_parts = [
         place
         for place in places
-        if _describe_parts_defined_in_file(place["file"]) != _EQUATIONS_PHRASE_FOR_ERROR_MESSAGES
+        if _describe_parts_defined_in_file(place["file"]) != _DEFAULT_SUBJECT_OF_ERROR_MESSAGES
     ]
     for place in (of_parts or places)[:1]:
         what, where = (
@@ -99,9 +99,9 @@ def _describe_parts_defined_in_file(source_file: str) -> str:
     names = [
         part.name
         for part in _iterate_named_part_subclasses()
-        if _source_file_of_part(part) == _resolve_path(source_file)
+        if _find_source_file_of_part(part) == _resolve_path(source_file)
     ]
-    return f"the part {' or '.join(names)}" if names else _EQUATIONS_PHRASE_FOR_ERROR_MESSAGES
+    return f"the part {' or '.join(names)}" if names else _DEFAULT_SUBJECT_OF_ERROR_MESSAGES
 
 
 def _iterate_named_part_subclasses(base_class: type[Part] = Part) -> Iterator[type[Part]]:
@@ -112,7 +112,7 @@ def _iterate_named_part_subclasses(base_class: type[Part] = Part) -> Iterator[ty
             yield part
 
 
-def _source_file_of_part(part_class: type[Part]) -> Path | None:
+def _find_source_file_of_part(part_class: type[Part]) -> Path | None:
     """Return the source file of a part class, or None for a notebook class."""
     try:
         return _resolve_path(inspect.getfile(part_class))

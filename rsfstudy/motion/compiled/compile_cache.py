@@ -37,9 +37,9 @@ from numba.core.sigutils import normalize_signature
 
 from rsfstudy.motion.compiled.array_operations import COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION
 from rsfstudy.motion.engines import compilation_log
-from rsfstudy.object_digest import ObjectDigest, global_names_read_by
+from rsfstudy.object_digest import ObjectDigest, list_global_names_read_by_code
 
-_CACHE_ENTRY_FILE_NAME = "motion.py"
+_PLACEHOLDER_SOURCE_FILE_NAME = "motion.py"
 #: Modules whose code is not part of a digest. Instead of the code, the digest contains the version
 #: of the module or the version of Python.
 _PACKAGES_IDENTIFIED_BY_VERSION_ONLY = {*sys.stdlib_module_names, "numpy", "numba"}
@@ -59,7 +59,7 @@ _CFUNCS_KEPT_ALIVE: list[Any] = []
 _logger = logging.getLogger(__name__)
 
 
-def compile_cache_folder() -> Path:
+def get_compile_cache_folder() -> Path:
     """Return the folder in which compiled functions are stored.
 
     Returns
@@ -95,20 +95,22 @@ def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
     settings = repr(
         (signature, versions, str(config.CPU_NAME), str(config.OPT), processor, options)
     )
-    return _digest_functions(*functions).add(settings).hexdigest(32)
+    return _digest_functions_and_callees(*functions).add_object(settings).hexdigest(32)
 
 
-def _digest_functions(*functions: Callable[..., Any]) -> ObjectDigest:
+def _digest_functions_and_callees(*functions: Callable[..., Any]) -> ObjectDigest:
     """Compute a digest of functions and of the functions that they call."""
-    return ObjectDigest(_is_module_digested, _compiled_replacement_of).add(functions)
+    return ObjectDigest(_is_module_code_digested, _replace_by_compiled_function).add_object(
+        functions
+    )
 
 
-def _is_module_digested(module_name: str | None) -> bool:
+def _is_module_code_digested(module_name: str | None) -> bool:
     """Return True if digests include the source code of a module."""
     return (module_name or "").partition(".")[0] not in _PACKAGES_IDENTIFIED_BY_VERSION_ONLY
 
 
-def compile_function(function: Callable[..., Any], signature: Any) -> Any:
+def compile_or_load_function(function: Callable[..., Any], signature: Any) -> Any:
     """Compile a function, or load it from the cache.
 
     Parameters
@@ -125,17 +127,17 @@ def compile_function(function: Callable[..., Any], signature: Any) -> Any:
     """
 
     def compile_for(entry: str) -> Any:
-        copy = _copy_with_compiled_globals(function, entry)
+        copy = _copy_function_with_compiled_callees(function, entry)
         dispatcher = numba.njit(copy, **_COMPILER_OPTIONS)
         if entry:
             dispatcher._cache = _ContentKeyedCache(copy)
         dispatcher.compile(signature)
         return dispatcher
 
-    return _load_or_compile(compute_code_digest(signature, function), compile_for)
+    return _load_or_compile_cache_entry(compute_code_digest(signature, function), compile_for)
 
 
-def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...]:
+def compile_cfuncs_and_get_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...]:
     """Compile functions with pointer arguments, or load them from the cache.
 
     Parameters
@@ -151,11 +153,15 @@ def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[in
 
     def compile_for(entry: str) -> list[Any]:
         return [
-            _compile_cfunc(_copy_with_compiled_globals(function, entry), use_cache=bool(entry))
+            _compile_cfunc(
+                _copy_function_with_compiled_callees(function, entry), use_cache=bool(entry)
+            )
             for function in functions
         ]
 
-    pointers = _load_or_compile(compute_code_digest(_CFUNC_SIGNATURE, *functions), compile_for)
+    pointers = _load_or_compile_cache_entry(
+        compute_code_digest(_CFUNC_SIGNATURE, *functions), compile_for
+    )
     _CFUNCS_KEPT_ALIVE.append(pointers)
     return tuple(pointer.address for pointer in pointers)
 
@@ -184,19 +190,21 @@ def _compile_cfunc(function: Any, *, use_cache: bool) -> Any:
     return compiled
 
 
-def _load_or_compile(entry_name: str, compile_with_cache_path: Callable[[str], Any]) -> Any:
+def _load_or_compile_cache_entry(
+    entry_name: str, compile_with_cache_path: Callable[[str], Any]
+) -> Any:
     """Load functions from their cache folder, or compile them.
 
     A damaged cache folder is replaced.
     """
-    folder = _cache_entry_folder(entry_name)
+    folder = _prepare_private_cache_entry_folder(entry_name)
     if folder is not None:
         if folder.exists():
             with contextlib.suppress(Exception):  # A damaged cache can raise any exception.
-                return compile_with_cache_path(str(folder / _CACHE_ENTRY_FILE_NAME))
+                return compile_with_cache_path(str(folder / _PLACEHOLDER_SOURCE_FILE_NAME))
         shutil.rmtree(folder, ignore_errors=True)
     began = time.perf_counter()
-    with compilation_log.create_context_while_compiling():
+    with compilation_log.create_compilation_context():
         try:
             return (
                 compile_with_cache_path("")
@@ -210,19 +218,19 @@ def _load_or_compile(entry_name: str, compile_with_cache_path: Callable[[str], A
             compilation_log.total_compilation_seconds += time.perf_counter() - began
 
 
-def _cache_entry_folder(entry_name: str) -> Path | None:
+def _prepare_private_cache_entry_folder(entry_name: str) -> Path | None:
     """Return the cache folder of an entry, or None if other users can write to it.
 
     The function also returns None if the folder cannot be created.
     """
     try:
-        cache = compile_cache_folder()
+        cache = get_compile_cache_folder()
         cache.parent.parent.mkdir(parents=True, exist_ok=True)
         for folder in (cache.parent, cache):
             folder.mkdir(mode=0o700, exist_ok=True)
         for folder in (cache.parent, cache, cache / entry_name):
             if folder.exists() and not _is_private_folder(folder):
-                _warn_folder_not_private(folder)
+                _warn_that_folder_is_not_private(folder)
                 return None
     except (OSError, RuntimeError):  # The folder cannot be created, or the user has no home folder.
         return None
@@ -230,7 +238,7 @@ def _cache_entry_folder(entry_name: str) -> Path | None:
 
 
 @functools.cache
-def _warn_folder_not_private(folder: Path) -> None:
+def _warn_that_folder_is_not_private(folder: Path) -> None:
     """Log a warning that other users can write to a folder, once per folder."""
     _logger.warning(
         "%s is not private to the current user, so rsfstudy does not use it as a cache of "
@@ -249,23 +257,23 @@ def _is_private_folder(folder: Path) -> bool:
 
 
 def _compile_in_temporary_folder(
-    folder: Path, compile_with_cache_path: Callable[[str], Any]
+    final_folder: Path, compile_with_cache_path: Callable[[str], Any]
 ) -> Any:
     """Compile functions in a temporary folder, and rename the folder at the end."""
-    aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
+    aside = Path(tempfile.mkdtemp(prefix=f"{final_folder.name}.", dir=final_folder.parent))
     try:
-        entry = aside / _CACHE_ENTRY_FILE_NAME
+        entry = aside / _PLACEHOLDER_SOURCE_FILE_NAME
         entry.write_text("# Placeholder for a function that rsfstudy has compiled.\n")
         os.utime(entry, (0, 0))  # The cache of Numba depends on the modification time.
         ready = compile_with_cache_path(str(entry))
         with contextlib.suppress(OSError):  # Another process may have renamed its folder earlier.
-            os.rename(aside, folder)
+            os.rename(aside, final_folder)
         return ready
     finally:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> Any:
+def _copy_function_with_compiled_callees(function: Any, cache_entry_path: str = "") -> Any:
     """Copy a function, and replace its callees by compiled functions.
 
     The qualified name of the copy contains a digest of its content. The digest is necessary because
@@ -274,13 +282,16 @@ def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> An
     file of the copy.
     """
     named = {
-        name: function.__globals__.get(name) for name in global_names_read_by(function.__code__)
+        name: function.__globals__.get(name)
+        for name in list_global_names_read_by_code(function.__code__)
     }
     reached = {
-        name: _jit_compile_callee(value) for name, value in named.items() if _is_function(value)
+        name: _jit_compile_callee(value)
+        for name, value in named.items()
+        if _is_python_function(value)
     }
     cells = tuple(
-        types.CellType(_jit_compile_callee(value) if _is_function(value) else value)
+        types.CellType(_jit_compile_callee(value) if _is_python_function(value) else value)
         for value in (cell.cell_contents for cell in function.__closure__ or ())
     )
     code = (
@@ -291,19 +302,23 @@ def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> An
     copy = types.FunctionType(
         code, {**function.__globals__, **reached}, function.__name__, None, cells or None
     )
-    copy.__qualname__ = f"{function.__name__}_{_digest_functions(function).hexdigest(32)}"
+    copy.__qualname__ = (
+        f"{function.__name__}_{_digest_functions_and_callees(function).hexdigest(32)}"
+    )
     return copy
 
 
-def _is_function(value: Any) -> bool:
+def _is_python_function(value: Any) -> bool:
     """Return True if a value is a Python function."""
     return isinstance(value, types.FunctionType)
 
 
-def _compiled_replacement_of(value: Any) -> Any:
+def _replace_by_compiled_function(value: Any) -> Any:
     """Replace a function by its compiled version. Return other values unchanged."""
     return (
-        COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION.get(value, value) if _is_function(value) else value
+        COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION.get(value, value)
+        if _is_python_function(value)
+        else value
     )
 
 
@@ -312,11 +327,11 @@ def _jit_compile_callee(function: Any) -> Any:
 
     A function that is called by several systems of equations is compiled only once.
     """
-    return _jit_compile_callee_cached(_compiled_replacement_of(function))
+    return _jit_compile_callee_once(_replace_by_compiled_function(function))
 
 
 @functools.cache
-def _jit_compile_callee_cached(function: Any) -> Any:
+def _jit_compile_callee_once(function: Any) -> Any:
     """Compile a function without the wrappers for calls from Python or C."""
     inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return numba.njit(_copy_with_compiled_globals(function), **_COMPILER_OPTIONS, **inner)
+    return numba.njit(_copy_function_with_compiled_callees(function), **_COMPILER_OPTIONS, **inner)

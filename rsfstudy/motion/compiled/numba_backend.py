@@ -19,19 +19,24 @@ from numba.core.errors import NumbaError
 
 from rsfstudy.motion import array_layout
 from rsfstudy.motion.compiled.compilation_errors import (
+    build_compilation_error,
     check_function_never_raises,
-    compilation_error,
 )
-from rsfstudy.motion.compiled.compile_cache import compile_cfunc_addresses, compile_function
+from rsfstudy.motion.compiled.compile_cache import (
+    compile_cfuncs_and_get_addresses,
+    compile_or_load_function,
+)
 from rsfstudy.motion.in_place_functions import build_in_place_functions
 from rsfstudy.motion.motion_loop import advance_motion
-from rsfstudy.motion.regime_switching import SwitchThresholds
-from rsfstudy.slider import Equations, Function, Numbers, Scene
+from rsfstudy.motion.regime_switching import RegimeSwitchThresholds
+from rsfstudy.slider import EquationsOfMotion, FloatTuple, NumericFunction, Scene
 
 _ARRAY_TYPE, _TABLE_TYPE = types.float64[::1], types.float64[:, ::1]
-_SWITCH_THRESHOLDS_TYPE = types.UniTuple(types.float64, len(SwitchThresholds._fields))
+_NUMBA_TYPE_OF_SWITCH_THRESHOLDS = types.UniTuple(
+    types.float64, len(RegimeSwitchThresholds._fields)
+)
 _NUMBA_TYPE_OF_LOOP_CONSTANTS = types.Tuple(
-    (_ARRAY_TYPE, types.int64[:, ::1], _SWITCH_THRESHOLDS_TYPE, _ARRAY_TYPE, _ARRAY_TYPE)
+    (_ARRAY_TYPE, types.int64[:, ::1], _NUMBA_TYPE_OF_SWITCH_THRESHOLDS, _ARRAY_TYPE, _ARRAY_TYPE)
 )
 
 
@@ -46,7 +51,7 @@ class NumbaBackend:
     The methods are documented in ``python_backend.PythonBackend``.
     """
 
-    def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> bytes:
+    def pack_initial_motion_state(self, field_values: tuple[tuple[str, float], ...]) -> bytes:
         """Return the initial values of all motion state fields as bytes.
 
         See ``python_backend.PythonBackend.initial_state_values``.
@@ -64,7 +69,7 @@ class NumbaBackend:
         return _pack_initial_state_bytes(field_values)
 
     def create_motion_state(
-        self, initial_state: bytes, call_arguments: tuple[float, ...]
+        self, initial_state: bytes, values_set_by_caller: tuple[float, ...]
     ) -> NumbaMotionState:
         """Create the state of a motion.
 
@@ -82,9 +87,11 @@ class NumbaBackend:
         NumbaMotionState
             State of the motion.
         """
-        return NumbaMotionState(initial_state, call_arguments)
+        return NumbaMotionState(initial_state, values_set_by_caller)
 
-    def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
+    def build_function_table(
+        self, equations_by_regime: tuple[EquationsOfMotion, ...]
+    ) -> np.ndarray:
         """Build the table of function addresses.
 
         See ``python_backend.PythonBackend.build_function_table``.
@@ -100,9 +107,11 @@ class NumbaBackend:
         ndarray of int, shape (2, FUNCTION_COUNT_PER_REGIME)
             Addresses of the functions, one row per regime.
         """
-        return _build_function_table(*map(compiled_function_addresses, equations_by_regime))
+        return _build_function_address_table(
+            *map(get_compiled_function_addresses, equations_by_regime)
+        )
 
-    def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
+    def convert_arrays_for_motion_loop(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
         """Return the arrays unchanged.
 
         See ``python_backend.PythonBackend.as_loop_arguments``.
@@ -119,7 +128,7 @@ class NumbaBackend:
         """
         return arrays
 
-    def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
+    def convert_parameters_for_motion_loop(self, parameters: Sequence[float]) -> Any:
         """Convert the parameters of a scene to an array.
 
         See ``python_backend.PythonBackend.as_loop_parameters``.
@@ -136,12 +145,12 @@ class NumbaBackend:
         """
         return np.array(parameters)
 
-    def get_loop_function(self) -> Any:
+    def get_motion_loop_function(self) -> Any:
         """Return the compiled event loop.
 
         See ``python_backend.PythonBackend``.
         """
-        return get_compiled_loop()
+        return compile_or_load_motion_loop()
 
 
 class NumbaMotionState:
@@ -163,9 +172,9 @@ class NumbaMotionState:
     def __init__(self, initial: bytes, called_with: tuple[float, ...]) -> None:
         self._bytes = bytearray(initial)
         array_layout.CALL_FORMAT.pack_into(self._bytes, 0, *called_with)
-        self.memory = np.frombuffer(self._bytes, array_layout.MOTION_STATE_DTYPE)
+        self.motion_state_array = np.frombuffer(self._bytes, array_layout.MOTION_STATE_DTYPE)
 
-    def work_and_row_counters(self) -> tuple[int, ...]:
+    def get_work_and_row_counts(self) -> tuple[int, ...]:
         """Return the counters of evaluations, steps and table rows.
 
         Returns
@@ -176,7 +185,7 @@ class NumbaMotionState:
         """
         return array_layout.COUNTER_FORMAT.unpack_from(self._bytes, array_layout.CALL_FORMAT.size)
 
-    def set_kinks_ahead(self, count: int) -> None:
+    def set_remaining_kink_count(self, count: int) -> None:
         """Set the number of remaining kinks.
 
         Parameters
@@ -184,7 +193,7 @@ class NumbaMotionState:
         count : int
             Number of remaining kinks.
         """
-        self.memory["kinks_ahead"] = count
+        self.motion_state_array["kinks_ahead"] = count
 
     def get_state_field(self, field_name: str) -> float:
         """Return the value of a field of the motion state.
@@ -199,7 +208,7 @@ class NumbaMotionState:
         float
             Value of the field.
         """
-        return float(self.memory[field_name][0])
+        return float(self.motion_state_array[field_name][0])
 
 
 def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
@@ -218,12 +227,12 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
     InvalidValue
         If a part of the scene cannot be compiled.
     """
-    get_compiled_loop()
-    compiled_function_addresses(scene.equations_between_ruptures(with_time=with_time))
+    compile_or_load_motion_loop()
+    get_compiled_function_addresses(scene.equations_between_ruptures(with_time=with_time))
     if scene.has_mass:
-        compiled_function_addresses(scene.equations_in_rupture(with_time=with_time))
+        get_compiled_function_addresses(scene.equations_in_rupture(with_time=with_time))
     if scene.has_mass and not with_time:
-        compiled_function_addresses(scene.equations_without_mass(with_time=False))
+        get_compiled_function_addresses(scene.equations_without_mass(with_time=False))
 
 
 @lru_cache(maxsize=256)
@@ -239,7 +248,7 @@ def _pack_initial_state_bytes(field_values: tuple[tuple[str, float], ...]) -> by
 
 
 @cache
-def _build_function_table(
+def _build_function_address_table(
     slow_regime_addresses: tuple[int, ...], fast_regime_addresses: tuple[int, ...] = ()
 ) -> np.ndarray:
     """Build the table of function addresses.
@@ -256,7 +265,7 @@ def _build_function_table(
 
 
 @cache
-def get_compiled_loop() -> Any:
+def compile_or_load_motion_loop() -> Any:
     """Compile the event loop, or load it from the cache.
 
     Returns
@@ -269,10 +278,10 @@ def get_compiled_loop() -> Any:
     signature = types.int64(
         memory, _ARRAY_TYPE, _ARRAY_TYPE, _ARRAY_TYPE, _NUMBA_TYPE_OF_LOOP_CONSTANTS, *tables
     )
-    return compile_function(advance_motion, signature)
+    return compile_or_load_function(advance_motion, signature)
 
 
-def compile_scalar_function(function: Function, *arguments: float | Numbers) -> Any:
+def compile_function_of_floats(function: NumericFunction, *arguments: float | FloatTuple) -> Any:
     """Compile a function whose arguments are floats or tuples of floats.
 
     Parameters
@@ -292,24 +301,24 @@ def compile_scalar_function(function: Function, *arguments: float | Numbers) -> 
     InvalidValue
         If the function cannot be compiled or contains a raise statement.
     """
-    return _compile_scalar_function_cached(
+    return _compile_function_of_floats_once(
         function, *[len(x) if isinstance(x, tuple) else 0 for x in arguments]
     )
 
 
 @cache
-def _compile_scalar_function_cached(function: Function, *argument_lengths: int) -> Any:
+def _compile_function_of_floats_once(function: NumericFunction, *argument_lengths: int) -> Any:
     """Compile a function whose arguments are floats or tuples of given lengths."""
     check_function_never_raises(function)
     floats = (types.UniTuple(types.float64, n) if n else types.float64 for n in argument_lengths)
     try:
-        return compile_function(function, tuple(floats))
+        return compile_or_load_function(function, tuple(floats))
     except NumbaError as error:
-        raise compilation_error(error) from error
+        raise build_compilation_error(error) from error
 
 
 @cache
-def compile_array_function(function: Function, *argument_dimensions: int) -> Any:
+def compile_function_of_arrays(function: NumericFunction, *argument_dimensions: int) -> Any:
     """Compile a function whose arguments are arrays.
 
     Parameters
@@ -325,10 +334,10 @@ def compile_array_function(function: Function, *argument_dimensions: int) -> Any
         Compiled function.
     """
     kinds = (types.Array(types.float64, count, "C") for count in argument_dimensions)
-    return compile_function(function, tuple(kinds))
+    return compile_or_load_function(function, tuple(kinds))
 
 
-def compiled_function_addresses(equations: Equations) -> tuple[int, ...]:
+def get_compiled_function_addresses(equations: EquationsOfMotion) -> tuple[int, ...]:
     """Return the addresses of the compiled functions of a system of equations.
 
     Parameters
@@ -346,23 +355,25 @@ def compiled_function_addresses(equations: Equations) -> tuple[int, ...]:
     InvalidValue
         If a function of a part cannot be compiled or contains a raise statement.
     """
-    return _compile_or_reuse_addresses(
+    return _compile_functions_or_reuse_addresses(
         tuple(filter(None, build_in_place_functions(equations))), equations
     )
 
 
-_COMPILED_ADDRESS_CACHE: dict[tuple[Any, ...], tuple[int, ...]] = {}
+_COMPILED_ADDRESSES_BY_FUNCTIONS: dict[tuple[Any, ...], tuple[int, ...]] = {}
 
 
-def _compile_or_reuse_addresses(
-    functions: tuple[Any, ...], equations: Equations
+def _compile_functions_or_reuse_addresses(
+    functions: tuple[Any, ...], equations: EquationsOfMotion
 ) -> tuple[int, ...]:
     """Compile functions that fill arrays, unless they are already compiled."""
-    if functions not in _COMPILED_ADDRESS_CACHE:
-        for function in (equations.rate_function, equations.point_function):
+    if functions not in _COMPILED_ADDRESSES_BY_FUNCTIONS:
+        for function in (equations.rate_function, equations.motion_point_function):
             check_function_never_raises(function)
         try:
-            _COMPILED_ADDRESS_CACHE[functions] = compile_cfunc_addresses(functions)
+            _COMPILED_ADDRESSES_BY_FUNCTIONS[functions] = compile_cfuncs_and_get_addresses(
+                functions
+            )
         except NumbaError as error:
-            raise compilation_error(error) from error
-    return _COMPILED_ADDRESS_CACHE[functions]
+            raise build_compilation_error(error) from error
+    return _COMPILED_ADDRESSES_BY_FUNCTIONS[functions]

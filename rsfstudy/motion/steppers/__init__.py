@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_members
-from rsfstudy.slider import Equations
+from rsfstudy.slider import EquationsOfMotion
 
 #: Return values of ``Stepper.attempt_step`` if no step was taken: the step size is too small, or
 #: the evaluation budget is exceeded.
@@ -51,7 +51,7 @@ class Stepper(ABC):
         super().__init_subclass__()
         add_new_names_for_former_members(cls)
 
-    def __init__(self, systems: tuple[Equations, ...], methods: Mapping[str, str]) -> None:
+    def __init__(self, systems: tuple[EquationsOfMotion, ...], methods: Mapping[str, str]) -> None:
         self.systems, self.failure = systems, "the step size became too small"
 
     @abstractmethod
@@ -148,7 +148,7 @@ class Stepper(ABC):
         """
 
 
-def begin_regime(motion, workspace):
+def begin_integration_of_regime(motion, workspace):
     """Reset the independent variable, and prepare the stepper for a regime.
 
     Parameters

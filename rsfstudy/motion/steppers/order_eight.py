@@ -23,7 +23,7 @@ from rsfstudy.motion.steppers.unrolled_step import (
     STAGE_COUNT_WITH_DENSE_OUTPUT,
     TOLERANCE_INDEX,
 )
-from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
+from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_independent_variable
 
 #: Runge-Kutta weights for dense output. ``_EXTRA_WEIGHTS`` defines the additional stages of dense
 #: output. ``_DENSE_WEIGHTS`` contains the weights of all stages in the coefficients of dense
@@ -39,7 +39,7 @@ _FIFTH_ORDER_WEIGHTS, _THIRD_ORDER_WEIGHTS = tuple(DOP853.E5.tolist()), tuple(DO
 _SAFETY_FACTOR, _MIN_FACTOR, _MAX_FACTOR, _ERROR_EXPONENT = 0.9, 0.2, 10.0, -1.0 / 8.0
 
 
-def begin_regime(motion, workspace):
+def begin_integration_of_regime(motion, workspace):
     """Evaluate the initial derivatives, and select the first step size.
 
     See ``Stepper.begin_regime``.
@@ -156,7 +156,7 @@ def step_to_segment_end(motion, workspace, approximate_length):
         approximate_length,
     )
     motion.end, motion.is_dense = motion.clock + approximate_length, 0
-    error = take_step_with_time_as_clock(motion, workspace)
+    error = take_step_with_time_as_variable(motion, workspace)
     count_evaluations(motion, STAGE_COUNT)
     if motion.evaluations_slow + motion.evaluations_fast > motion.budget:
         return BUDGET_SPENT
@@ -169,7 +169,7 @@ def step_to_segment_end(motion, workspace, approximate_length):
     return 0.0
 
 
-def take_step_with_time_as_clock(motion, workspace):
+def take_step_with_time_as_variable(motion, workspace):
     """Take one step with time as independent variable, and return its error ratio.
 
     Parameters
@@ -197,7 +197,7 @@ def take_step_with_time_as_clock(motion, workspace):
             for j in range(s):
                 together += _RUNGE_KUTTA_STAGE_WEIGHTS[s][j] * stages[j * count + i]
             new[i] = y[i] + length * together
-        evaluate_rates_by_step_clock(
+        evaluate_rates_by_independent_variable(
             motion, workspace, new, advance_pointer_by_items(stages, s * count)
         )
     fifth = third = 0.0
@@ -298,7 +298,7 @@ def reduce_step_length(length, error_over_tolerance):
     return length * (factor if factor > _MIN_FACTOR else _MIN_FACTOR)
 
 
-def select_initial_step_length(workspace, clock_direction, tolerance):
+def select_initial_step_length(workspace, integration_direction, tolerance):
     """Select the size of the first step of a regime.
 
     The algorithm needs one evaluation of the right-hand side.
@@ -331,7 +331,7 @@ def select_initial_step_length(workspace, clock_direction, tolerance):
     d0, d1 = math.sqrt(d0 / count), math.sqrt(d1 / count)
     trial = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     for i in range(count):
-        workspace.y_end[i] = y[i] + trial * clock_direction * first[i]
+        workspace.y_end[i] = y[i] + trial * integration_direction * first[i]
     evaluate_function_into_array(
         workspace.functions.fill_rates, workspace.y_end, y, workspace.parameters, workspace.y_within
     )
@@ -377,7 +377,7 @@ def prepare_dense_output(motion, workspace, step_length):
                 )
             workspace.y_within[i] = y[i] + step_length * together
         rates = advance_pointer_by_items(stages, (STAGE_COUNT + 1 + s) * count)
-        evaluate_rates_by_step_clock(motion, workspace, workspace.y_within, rates)
+        evaluate_rates_by_independent_variable(motion, workspace, workspace.y_within, rates)
     for i in range(count):
         change = workspace.y_end[i] - y[i]
         first, last = stages[i], stages[STAGE_COUNT * count + i]
@@ -427,7 +427,7 @@ class OrderEightStepper(Stepper):
     """
 
     name = "python"
-    begin_regime = staticmethod(begin_regime)
+    begin_regime = staticmethod(begin_integration_of_regime)
     attempt_step = staticmethod(attempt_step)
     step_to_segment_end = staticmethod(step_to_segment_end)
     interpolate_unknowns = staticmethod(interpolate_unknowns)

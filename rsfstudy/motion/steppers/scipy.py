@@ -22,17 +22,17 @@ from rsfstudy.motion.array_layout import SLOW_REGIME
 from rsfstudy.motion.max_step_length import MAX_STEP_LENGTH
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper, order_eight
 from rsfstudy.motion.work_meter import MotionStopped
-from rsfstudy.slider import Equations, Numbers
+from rsfstudy.slider import EquationsOfMotion, FloatTuple
 from rsfstudy.status import Status
 
 #: ODE solvers of SciPy.
 SCIPY_SOLVER_BY_METHOD_NAME: Mapping[str, type[OdeSolver]] = {
     method.__name__: method for method in (DOP853, RK45, RK23, Radau, BDF, LSODA)
 }
-DEFAULT_METHOD = "DOP853"
+DEFAULT_SCIPY_METHOD = "DOP853"
 
 
-class _BudgetExceeded(Exception):
+class _EvaluationBudgetExceeded(Exception):
     """Exception raised if a step exceeds the evaluation budget."""
 
 
@@ -72,9 +72,9 @@ class SciPyStepper(Stepper):
 
     name = "scipy"
 
-    def __init__(self, systems: tuple[Equations, ...], methods: Mapping[str, str]) -> None:
+    def __init__(self, systems: tuple[EquationsOfMotion, ...], methods: Mapping[str, str]) -> None:
         super().__init__(systems, methods)
-        names = (methods.get(system.regime, DEFAULT_METHOD) for system in systems)
+        names = (methods.get(system.regime, DEFAULT_SCIPY_METHOD) for system in systems)
         self._methods = [SCIPY_SOLVER_BY_METHOD_NAME[name] for name in names]
         self._solver: Any = None
         self._interpolant: Any = None
@@ -122,7 +122,7 @@ class SciPyStepper(Stepper):
         motion.end, self._interpolant = float(solver.t), None
         motion.step_length = motion.end - motion.clock
         motion.next_step_length = float(getattr(solver, "h_abs", abs(motion.step_length)))
-        self._store_step_end(workspace)
+        self._copy_step_end_to_workspace(workspace)
         return abs(float(motion.step_length))
 
     def step_to_segment_end(self, motion: Any, workspace: Any, approximate_length: float) -> float:
@@ -175,7 +175,7 @@ class SciPyStepper(Stepper):
             if len(within) > 1
             else _build_interpolant_of_unknowns(within[0])
         )
-        self._store_step_end(workspace)
+        self._copy_step_end_to_workspace(workspace)
 
     def _create_solver(
         self,
@@ -189,15 +189,15 @@ class SciPyStepper(Stepper):
         system = self.systems[motion.regime]
         rate_of, p, is_slow = system.rate_function, system.parameters, motion.regime == SLOW_REGIME
 
-        def rate(_clock: float, unknowns: np.ndarray) -> Numbers:
+        def rate(_clock: float, unknowns: np.ndarray) -> FloatTuple:
             if is_slow:  # A call of `count_evaluations` would take twice as long.
                 motion.evaluations_slow += 1
             else:
                 motion.evaluations_fast += 1
             if motion.evaluations_slow + motion.evaluations_fast > self._max_evaluations:
-                raise _BudgetExceeded
+                raise _EvaluationBudgetExceeded
             try:
-                changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
+                changes: FloatTuple = rate_of(tuple(unknowns.tolist()), p)
             except OverflowError:  # The solver rejects a trial step with NaN.
                 return (math.nan,) * len(unknowns)
             return changes
@@ -232,7 +232,7 @@ class SciPyStepper(Stepper):
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 self.failure = str(solver.step())
-        except _BudgetExceeded:
+        except _EvaluationBudgetExceeded:
             return False
         finally:
             self._max_evaluations = math.inf
@@ -249,7 +249,7 @@ class SciPyStepper(Stepper):
             known = self._solver.fun(self._solver.t, self._solver.y)
         return np.asarray(known, dtype=float)
 
-    def _store_step_end(self, workspace: Any) -> None:
+    def _copy_step_end_to_workspace(self, workspace: Any) -> None:
         """Copy the end of the step to the workspace."""
         workspace.y_end[: workspace.unknown_count] = self._solver.y
         workspace.rates_at_end[: workspace.unknown_count] = self._get_current_solver_rates()

@@ -28,7 +28,7 @@ STAGE_COUNT, EXTRA_STAGE_COUNT, DENSE_ROW_COUNT = 12, 3, 7
 STAGE_COUNT_WITH_DENSE_OUTPUT = STAGE_COUNT + 1 + EXTRA_STAGE_COUNT
 #: Weights of the derivatives in each weighted sum. The weighted sums are the stages and the error
 #: estimates of order five and three. The last stage is the end of the step.
-_DERIVATIVE_WEIGHTS_BY_SUM_NAME: Mapping[str, np.ndarray] = {
+_RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME: Mapping[str, np.ndarray] = {
     **{f"stage_{s}": DOP853.A[s, :s] for s in range(1, STAGE_COUNT)},
     f"stage_{STAGE_COUNT}": DOP853.B,
     "error_of_fifth": DOP853.E5,
@@ -38,12 +38,12 @@ _DERIVATIVE_WEIGHTS_BY_SUM_NAME: Mapping[str, np.ndarray] = {
 #: tolerance. The last constant is the length of the header.
 LENGTH_INDEX, TOLERANCE_INDEX, ERROR_INDEX, HEADER_SIZE = 0, 1, 2, 3
 
-Function = Callable[..., Any]
+AnyCallable = Callable[..., Any]
 
 
 def build_step_attempt_function(
-    rate_function: Function, unknown_count: int, unpack_parameters: Function
-) -> Function:
+    rate_function: AnyCallable, unknown_count: int, unpack_parameters: AnyCallable
+) -> AnyCallable:
     """Build a function that attempts one step.
 
     Parameters
@@ -63,12 +63,12 @@ def build_step_attempt_function(
         derivatives at ``y``. The function fills in the other stages, the final unknowns and the
         error.
     """
-    made: Function = _build_step_attempt_factory(unknown_count)(rate_function, unpack_parameters)
+    made: AnyCallable = _build_step_attempt_factory(unknown_count)(rate_function, unpack_parameters)
     return made
 
 
 @cache
-def _build_step_attempt_factory(unknown_count: int) -> Function:
+def _build_step_attempt_factory(unknown_count: int) -> AnyCallable:
     """Compile a function that builds step functions from right-hand sides."""
     n, scales = range(unknown_count), HEADER_SIZE + unknown_count
     lines = [
@@ -80,7 +80,7 @@ def _build_step_attempt_factory(unknown_count: int) -> Function:
     for s in range(1, STAGE_COUNT + 1):
         unknown, rates = (", ".join(f"{x}{i}" for i in n) for x in ("z", f"k{s}_"))
         lines += [
-            *(f"z{i} = y{i} + length * {_sum_call_source(f'stage_{s}', i)}" for i in n),
+            *(f"z{i} = y{i} + length * {_write_weighted_sum_call(f'stage_{s}', i)}" for i in n),
             f"{rates}, = rate_of(({unknown},), of_scene)",
             *(f"stages[{s * unknown_count + i}] = k{s}_{i}" for i in n),
         ]
@@ -88,8 +88,8 @@ def _build_step_attempt_factory(unknown_count: int) -> Function:
         lines += [
             f"step[{HEADER_SIZE + i}] = z{i}",
             f"allowed = tolerance * (step[{scales + i}] + max(abs(y{i}), abs(z{i})))",
-            f"fifth{i} = {_sum_call_source('error_of_fifth', i)} / allowed",
-            f"third{i} = {_sum_call_source('error_of_third', i)} / allowed",
+            f"fifth{i} = {_write_weighted_sum_call('error_of_fifth', i)} / allowed",
+            f"third{i} = {_write_weighted_sum_call('error_of_third', i)} / allowed",
         ]
     lines += [
         f"fifth = {' + '.join(f'fifth{i} * fifth{i}' for i in n)}",
@@ -99,7 +99,7 @@ def _build_step_attempt_factory(unknown_count: int) -> Function:
         f"step[{ERROR_INDEX}] = error",
     ]
     inner = "\n        ".join(["def attempt(y, stages, p, step):", *lines])
-    return _compile_function_source(
+    return _compile_function_from_source(
         "attempts", "rate_of, numbers", [inner, "return attempt"], _compile_weighted_sum_functions()
     )
 
@@ -111,42 +111,47 @@ def _compile_weighted_sum_functions() -> dict[str, Any]:
     All systems of equations share the compiled functions.
     """
     return {
-        name: _compile_function_source(
-            name, _sum_argument_source(name), [f"return {_weighted_sum_source(name)}"], {}
+        name: _compile_function_from_source(
+            name,
+            _write_weighted_sum_arguments(name),
+            [f"return {_write_weighted_sum_expression(name)}"],
+            {},
         )
-        for name in _DERIVATIVE_WEIGHTS_BY_SUM_NAME
+        for name in _RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME
     }
 
 
-def _sum_call_source(sum_name: str, unknown_index: int) -> str:
+def _write_weighted_sum_call(sum_name: str, unknown_index: int) -> str:
     """Return the source code of a weighted sum for one unknown."""
-    rates = _sum_argument_source(sum_name).split(", ")
+    rates = _write_weighted_sum_arguments(sum_name).split(", ")
     return f"{sum_name}({', '.join(f'{rate}_{unknown_index}' for rate in rates)})"
 
 
-def _sum_argument_source(sum_name: str) -> str:
+def _write_weighted_sum_arguments(sum_name: str) -> str:
     """Return the source code of the argument list of a weighted sum."""
-    return ", ".join(f"k{s}" for s in np.flatnonzero(_DERIVATIVE_WEIGHTS_BY_SUM_NAME[sum_name]))
+    return ", ".join(f"k{s}" for s in np.flatnonzero(_RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME[sum_name]))
 
 
-def _weighted_sum_source(sum_name: str) -> str:
+def _write_weighted_sum_expression(sum_name: str) -> str:
     """Return the source code of the expression of a weighted sum."""
     return " + ".join(
-        f"{float(x)!r} * k{s}" for s, x in enumerate(_DERIVATIVE_WEIGHTS_BY_SUM_NAME[sum_name]) if x
+        f"{float(x)!r} * k{s}"
+        for s, x in enumerate(_RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME[sum_name])
+        if x
     )
 
 
-def _compile_function_source(
+def _compile_function_from_source(
     function_name: str,
     argument_source: str,
     body_lines: Sequence[str],
     global_values: Mapping[str, Any],
-) -> Function:
+) -> AnyCallable:
     """Compile a function from source code that a debugger can display."""
     made: dict[str, Any] = {**global_values, "__name__": __name__, "math": math}
     text = "\n    ".join([f"def {function_name}({argument_source}):", *body_lines])
     file = f"<{__name__}.{function_name} {crc32(text.encode()):08x}>"
     linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file
     exec(compile(text, file, "exec"), made)
-    function: Function = made[function_name]
+    function: AnyCallable = made[function_name]
     return function

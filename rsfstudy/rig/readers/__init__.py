@@ -13,43 +13,47 @@ from typing import Any
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.readers.arrays import (
-    is_arrays,
-    is_dataset,
-    is_netcdf,
-    is_record,
-    read_arrays,
+    is_mapping_or_dataframe,
+    is_netcdf_file,
+    is_record_object,
+    is_xarray_dataset,
     read_columns_of_record,
-    read_dataset,
-    read_netcdf,
+    read_mapping_or_dataframe,
+    read_netcdf_file,
+    read_xarray_dataset,
 )
-from rsfstudy.rig.readers.compressed_files import decompress, is_compressed
-from rsfstudy.rig.readers.matlab_files import is_matlab, read_matlab
-from rsfstudy.rig.readers.source import Source, Table
+from rsfstudy.rig.readers.compressed_files import decompress_file, is_compressed_file
+from rsfstudy.rig.readers.matlab_files import is_matlab_file, read_matlab_file
+from rsfstudy.rig.readers.source import SourceTable, TableSource
 from rsfstudy.rig.readers.spreadsheets import is_workbook, read_workbook
-from rsfstudy.rig.readers.tdms_files import is_tdms, read_tdms
-from rsfstudy.rig.readers.text_files import is_text, read_text
-from rsfstudy.rig.readers.unknown_files import is_known_but_unreadable, refuse_format
-from rsfstudy.rig.readers.xlook_files import is_binary, read_xlook
+from rsfstudy.rig.readers.tdms_files import is_tdms_file, read_tdms_file
+from rsfstudy.rig.readers.text_files import is_text_file, read_text_file
+from rsfstudy.rig.readers.unknown_files import is_unsupported_format, raise_unsupported_format_error
+from rsfstudy.rig.readers.xlook_files import is_binary_file, read_xlook_file
 
 #: Readers in the order in which they are tried. The first function of each pair recognises a
 #: source, and the second function reads the source. A reader of compressed files returns a source
 #: with the decompressed bytes.
-READERS: list[tuple[Callable[[Source], bool], Callable[[Source], Table | Source]]] = [
-    (is_record, read_columns_of_record),
-    (is_dataset, read_dataset),
-    (is_arrays, read_arrays),
-    (is_compressed, decompress),
+FORMAT_TESTS_AND_READERS: list[
+    tuple[Callable[[TableSource], bool], Callable[[TableSource], SourceTable | TableSource]]
+] = [
+    (is_record_object, read_columns_of_record),
+    (is_xarray_dataset, read_xarray_dataset),
+    (is_mapping_or_dataframe, read_mapping_or_dataframe),
+    (is_compressed_file, decompress_file),
     (is_workbook, read_workbook),
-    (is_matlab, read_matlab),
-    (is_tdms, read_tdms),
-    (is_netcdf, read_netcdf),
-    (is_known_but_unreadable, refuse_format),
-    (is_text, read_text),
-    (is_binary, read_xlook),
+    (is_matlab_file, read_matlab_file),
+    (is_tdms_file, read_tdms_file),
+    (is_netcdf_file, read_netcdf_file),
+    (is_unsupported_format, raise_unsupported_format_error),
+    (is_text_file, read_text_file),
+    (is_binary_file, read_xlook_file),
 ]
 
 
-def read_source(origin: Any, *, decimal: str = ".", sheet: str = "") -> Table:
+def read_table_from_source(
+    path_or_object: Any, *, decimal_separator: str = ".", sheet_or_group_name: str = ""
+) -> SourceTable:
     """Read a table from a file or an object in any known format.
 
     Parameters
@@ -73,18 +77,24 @@ def read_source(origin: Any, *, decimal: str = ".", sheet: str = "") -> Table:
     InvalidValue
         If the type of the object is not supported, or if the decimal separator is unknown.
     """
-    if decimal not in (".", ","):
-        raise InvalidValue("decimal", decimal, "is unknown", choices=(".", ","))
-    return _read(Source(origin, decimal, sheet))
+    if decimal_separator not in (".", ","):
+        raise InvalidValue("decimal", decimal_separator, "is unknown", choices=(".", ","))
+    return _read_with_first_matching_reader(
+        TableSource(path_or_object, decimal_separator, sheet_or_group_name)
+    )
 
 
-def _read(source: Source) -> Table:
+def _read_with_first_matching_reader(source: TableSource) -> SourceTable:
     """Read a source with the first reader that recognises it."""
-    for recognises, read in READERS:
+    for recognises, read in FORMAT_TESTS_AND_READERS:
         if recognises(source):
             found = read(source)
-            return found if isinstance(found, Table) else _read(found)
+            return (
+                found if isinstance(found, SourceTable) else _read_with_first_matching_reader(found)
+            )
     if source.is_file:
-        raise DataError(f"{source.origin}: has an unknown format. Export the table as a CSV file.")
+        raise DataError(
+            f"{source.path_or_object}: has an unknown format. Export the table as a CSV file."
+        )
     remedy = "Pass the path of a file, a mapping of arrays, a DataFrame, a Dataset or a Record."
-    raise InvalidValue("record", source.origin, "is not a record", remedy=remedy)
+    raise InvalidValue("record", source.path_or_object, "is not a record", remedy=remedy)

@@ -14,12 +14,12 @@ import xarray as xr
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import RECORD_COLUMNS, Record
 from rsfstudy.rig.columns import Column
-from rsfstudy.rig.readers.source import Source, Table, merge_headings_with_units
+from rsfstudy.rig.readers.source import SourceTable, TableSource, append_units_to_headings
 
 _NETCDF_SIGNATURES = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n")
 
 
-def is_arrays(source: Source) -> bool:
+def is_mapping_or_dataframe(source: TableSource) -> bool:
     """Return True if the source is a mapping of arrays or a DataFrame.
 
     Parameters
@@ -32,10 +32,12 @@ def is_arrays(source: Source) -> bool:
     bool
         True if the source is a mapping or a DataFrame.
     """
-    return isinstance(source.origin, Mapping | pd.DataFrame) and not is_dataset(source)
+    return isinstance(source.path_or_object, Mapping | pd.DataFrame) and not is_xarray_dataset(
+        source
+    )
 
 
-def read_arrays(source: Source) -> Table:
+def read_mapping_or_dataframe(source: TableSource) -> SourceTable:
     """Build a table from a mapping of arrays or from a DataFrame.
 
     Parameters
@@ -49,14 +51,14 @@ def read_arrays(source: Source) -> Table:
     Table
         Table of the arrays.
     """
-    keys = [*source.origin]
+    keys = [*source.path_or_object]
     headings = [*map(str, keys)]
     has_units = any("(" in heading or "[" in heading for heading in headings)
-    table = _build_table(source.origin, keys, headings)
+    table = _build_table_of_mapping(source.path_or_object, keys, headings)
     return replace(table, default_units=not has_units, has_only_columns=not has_units)
 
 
-def is_dataset(source: Source) -> bool:
+def is_xarray_dataset(source: TableSource) -> bool:
     """Return True if the source is an xarray Dataset.
 
     Parameters
@@ -69,10 +71,10 @@ def is_dataset(source: Source) -> bool:
     bool
         True if the source is a Dataset.
     """
-    return isinstance(source.origin, xr.Dataset)
+    return isinstance(source.path_or_object, xr.Dataset)
 
 
-def read_dataset(source: Source) -> Table:
+def read_xarray_dataset(source: TableSource) -> SourceTable:
     """Build a table from the variables and coordinates of an xarray Dataset.
 
     Parameters
@@ -85,10 +87,10 @@ def read_dataset(source: Source) -> Table:
     Table
         Table of the one-dimensional variables.
     """
-    return _build_table_of_dataset(source.origin)
+    return _build_table_of_dataset(source.path_or_object)
 
 
-def is_netcdf(source: Source) -> bool:
+def is_netcdf_file(source: TableSource) -> bool:
     """Return True if the file is a NetCDF file.
 
     Parameters
@@ -101,10 +103,10 @@ def is_netcdf(source: Source) -> bool:
     bool
         True if the file is a NetCDF file or another HDF5 file.
     """
-    return source.signature.startswith(_NETCDF_SIGNATURES)
+    return source.first_bytes_of_file.startswith(_NETCDF_SIGNATURES)
 
 
-def read_netcdf(source: Source) -> Table:
+def read_netcdf_file(source: TableSource) -> SourceTable:
     """Read the variables of a NetCDF file.
 
     Parameters
@@ -122,17 +124,19 @@ def read_netcdf(source: Source) -> Table:
     DataError
         If the file is damaged, or if the file is compressed.
     """
-    if source.content is not None:
-        raise DataError(f"{source.origin}: is a compressed NetCDF file. Decompress the file first.")
+    if source.file_bytes is not None:
+        raise DataError(
+            f"{source.path_or_object}: is a compressed NetCDF file. Decompress the file first."
+        )
     try:
         with xr.open_dataset(source.path, engine="netcdf4", decode_times=False) as dataset:
             loaded = dataset.load()
     except Exception as error:  # The NetCDF library raises errors of many types.
-        raise DataError(f"{source.origin}: cannot be read as NetCDF ({error})") from error
+        raise DataError(f"{source.path_or_object}: cannot be read as NetCDF ({error})") from error
     return _build_table_of_dataset(loaded)
 
 
-def is_record(source: Source) -> bool:
+def is_record_object(source: TableSource) -> bool:
     """Return True if the source is a ``Record``.
 
     Parameters
@@ -145,10 +149,10 @@ def is_record(source: Source) -> bool:
     bool
         True if the source is a record.
     """
-    return isinstance(source.origin, Record)
+    return isinstance(source.path_or_object, Record)
 
 
-def read_columns_of_record(source: Source) -> Table:
+def read_columns_of_record(source: TableSource) -> SourceTable:
     """Build a table from the columns of a ``Record``.
 
     Parameters
@@ -161,32 +165,34 @@ def read_columns_of_record(source: Source) -> Table:
     Table
         Table of the columns, whose headings contain their units.
     """
-    columns = source.origin.columns
+    columns = source.path_or_object.columns
     units = {about.name: about.units for about in RECORD_COLUMNS}
-    headings = merge_headings_with_units([*columns], [units.get(name, "") for name in columns])
-    return _build_table(columns, [*columns], headings)
+    headings = append_units_to_headings([*columns], [units.get(name, "") for name in columns])
+    return _build_table_of_mapping(columns, [*columns], headings)
 
 
-def _build_table_of_dataset(dataset: xr.Dataset) -> Table:
+def _build_table_of_dataset(dataset: xr.Dataset) -> SourceTable:
     names: list[Hashable] = [name for name, of in dataset.variables.items() if of.ndim == 1]
     units = [str(dataset[name].attrs.get("units", "")) for name in names]
-    table = _build_table(dataset, names, merge_headings_with_units([*map(str, names)], units))
+    table = _build_table_of_mapping(
+        dataset, names, append_units_to_headings([*map(str, names)], units)
+    )
     return replace(table, default_units=not any(units))
 
 
-def _build_table(source: Any, keys: list[Any], headings: list[str]) -> Table:
+def _build_table_of_mapping(mapping: Any, keys: list[Any], headings: list[str]) -> SourceTable:
     """Build a table whose columns are the values of a mapping."""
 
     def load(index: int, quantity_name: str) -> Column:
-        values, units = _to_floats_and_units(quantity_name, source[keys[index]])
+        values, units = _convert_to_floats_and_units(quantity_name, mapping[keys[index]])
         if values.ndim != 1:
             raise InvalidValue(quantity_name, values.shape, "must have one dimension")
         return Column(values, units)
 
-    return Table(headings, "record", load)
+    return SourceTable(headings, "record", load)
 
 
-def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
+def _convert_to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
     """Convert an array to floats, and return the units that follow from its type.
 
     Masked values become NaN. Times are converted to seconds. Dates are converted to seconds since

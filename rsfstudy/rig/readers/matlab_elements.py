@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 #: Types of numbers, indexed by the type codes of data elements.
-_NUMBER_TYPES = {
+_NUMPY_TYPE_BY_MATLAB_TYPE_CODE = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
 }  # fmt: skip
 _MATRIX, _COMPRESSED = 14, 15
@@ -25,14 +25,14 @@ _HEADER_BYTES, _TAG_BYTES = 128, 8
 _MAX_DEPTH, _MAX_DECOMPRESSED_BYTES = 4, 2**31
 
 
-class _Element(NamedTuple):
+class _DataElement(NamedTuple):
     """Data element with its type code and its bytes."""
 
-    code: int
-    content: bytes
+    type_code: int
+    content_bytes: bytes
 
 
-def read_numeric_arrays(data: bytes) -> dict[str, np.ndarray]:
+def read_numeric_arrays(file_bytes: bytes) -> dict[str, np.ndarray]:
     """Read the real numeric arrays of a MATLAB file.
 
     Parameters
@@ -51,23 +51,23 @@ def read_numeric_arrays(data: bytes) -> dict[str, np.ndarray]:
     ValueError
         If the file is damaged.
     """
-    order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER_BYTES - 2 : _HEADER_BYTES])
+    order = {b"IM": "<", b"MI": ">"}.get(file_bytes[_HEADER_BYTES - 2 : _HEADER_BYTES])
     if order is None:
         raise ValueError("the header does not state the byte order")
     found: dict[str, np.ndarray] = {}
-    for element in _split_elements(data[_HEADER_BYTES:], order):
-        if element.code == _COMPRESSED:
-            for inner in _split_elements(_decompress(element.content), order):
-                found |= _read_matrix(inner, order, "")
+    for element in _iterate_data_elements(file_bytes[_HEADER_BYTES:], order):
+        if element.type_code == _COMPRESSED:
+            for inner in _iterate_data_elements(_decompress_variable(element.content_bytes), order):
+                found |= _read_numeric_matrix_or_structure(inner, order, "")
         else:
-            found |= _read_matrix(element, order, "")
+            found |= _read_numeric_matrix_or_structure(element, order, "")
     return found
 
 
-def _decompress(content: bytes) -> bytes:
+def _decompress_variable(compressed_bytes: bytes) -> bytes:
     decompressor = zlib.decompressobj()
     try:
-        found = decompressor.decompress(content, _MAX_DECOMPRESSED_BYTES)
+        found = decompressor.decompress(compressed_bytes, _MAX_DECOMPRESSED_BYTES)
     except zlib.error as error:
         raise ValueError(f"a variable cannot be decompressed: {error}") from error
     if decompressor.unconsumed_tail:
@@ -75,64 +75,78 @@ def _decompress(content: bytes) -> bytes:
     return found
 
 
-def _split_elements(data: bytes, order: str) -> Iterator[_Element]:
+def _iterate_data_elements(element_bytes: bytes, byte_order: str) -> Iterator[_DataElement]:
     """Yield the data elements in a sequence of bytes.
 
     The last element may lack the padding at its end.
     """
     start = 0
-    while start + _TAG_BYTES <= len(data):
-        first, size = (int(n) for n in np.frombuffer(data, f"{order}u4", 2, start))
+    while start + _TAG_BYTES <= len(element_bytes):
+        first, size = (int(n) for n in np.frombuffer(element_bytes, f"{byte_order}u4", 2, start))
         if first >> 16:  # Small elements contain type, size and data in eight bytes.
             code, size = first & 0xFFFF, first >> 16
-            content, end = data[start + 4 : start + 4 + size], start + _TAG_BYTES
+            content, end = element_bytes[start + 4 : start + 4 + size], start + _TAG_BYTES
         else:
             code, end = first, start + _TAG_BYTES + size
-            content = data[start + _TAG_BYTES : end]
+            content = element_bytes[start + _TAG_BYTES : end]
             if code != _COMPRESSED:
                 end += -size % _TAG_BYTES
         if len(content) != size:
             raise ValueError("a variable ends beyond the end of the file")
-        yield _Element(code, content)
+        yield _DataElement(code, content)
         start = end
 
 
-def _read_matrix(element: _Element, order: str, prefix: str) -> dict[str, np.ndarray]:
+def _read_numeric_matrix_or_structure(
+    element: _DataElement, byte_order: str, name_prefix: str
+) -> dict[str, np.ndarray]:
     """Read a numeric array, or the numeric arrays in the fields of a structure."""
-    if element.code != _MATRIX:
+    if element.type_code != _MATRIX:
         return {}
-    parts = [*_split_elements(element.content, order)]
-    if len(parts) < 3 or len(parts[0].content) < _TAG_BYTES or len(parts[1].content) % 4:
+    parts = [*_iterate_data_elements(element.content_bytes, byte_order)]
+    if (
+        len(parts) < 3
+        or len(parts[0].content_bytes) < _TAG_BYTES
+        or len(parts[1].content_bytes) % 4
+    ):
         return {}
-    kind = int(np.frombuffer(parts[0].content, f"{order}u4", 1)[0]) & 0xFF
-    shape = tuple(int(n) for n in np.frombuffer(parts[1].content, f"{order}i4"))
-    name = prefix + parts[2].content.decode("ascii", "replace")
-    if kind in _NUMERIC_CLASSES and len(parts) == 4 and parts[3].code in _NUMBER_TYPES:
-        numbers = np.dtype(f"{order}{_NUMBER_TYPES[parts[3].code]}")
+    kind = int(np.frombuffer(parts[0].content_bytes, f"{byte_order}u4", 1)[0]) & 0xFF
+    shape = tuple(int(n) for n in np.frombuffer(parts[1].content_bytes, f"{byte_order}i4"))
+    name = name_prefix + parts[2].content_bytes.decode("ascii", "replace")
+    if (
+        kind in _NUMERIC_CLASSES
+        and len(parts) == 4
+        and parts[3].type_code in _NUMPY_TYPE_BY_MATLAB_TYPE_CODE
+    ):
+        numbers = np.dtype(f"{byte_order}{_NUMPY_TYPE_BY_MATLAB_TYPE_CODE[parts[3].type_code]}")
         size = math.prod(shape) * numbers.itemsize
-        if min(shape, default=-1) < 0 or len(parts[3].content) != size:
+        if min(shape, default=-1) < 0 or len(parts[3].content_bytes) != size:
             raise ValueError(f"the variable {name!r} does not have the stated size")
-        return {name: np.frombuffer(parts[3].content, numbers).reshape(shape, order="F")}
+        return {name: np.frombuffer(parts[3].content_bytes, numbers).reshape(shape, order="F")}
     if kind == _STRUCTURE and math.prod(shape) == 1 and name.count(".") < _MAX_DEPTH:
-        return _read_structure(parts, order, name)
+        return _read_structure_fields(parts, byte_order, name)
     return {}
 
 
-def _read_structure(parts: list[_Element], order: str, name: str) -> dict[str, np.ndarray]:
+def _read_structure_fields(
+    structure_elements: list[_DataElement], byte_order: str, structure_name: str
+) -> dict[str, np.ndarray]:
     """Read the numeric arrays in the fields of a structure.
 
     A structure consists of the following elements: flags, dimensions, name, length of the field
     names, field names, and fields.
     """
-    if len(parts) < 5 or len(parts[3].content) < 4:
-        raise ValueError(f"the structure {name!r} has no fields")
-    length = int(np.frombuffer(parts[3].content, f"{order}i4", 1)[0])
-    texts = parts[4].content
-    if length < 1 or len(texts) // length != len(parts) - 5:
-        raise ValueError(f"the structure {name!r} does not have the stated fields")
+    if len(structure_elements) < 5 or len(structure_elements[3].content_bytes) < 4:
+        raise ValueError(f"the structure {structure_name!r} has no fields")
+    length = int(np.frombuffer(structure_elements[3].content_bytes, f"{byte_order}i4", 1)[0])
+    texts = structure_elements[4].content_bytes
+    if length < 1 or len(texts) // length != len(structure_elements) - 5:
+        raise ValueError(f"the structure {structure_name!r} does not have the stated fields")
     found: dict[str, np.ndarray] = {}
-    for number, field in enumerate(parts[5:]):
+    for number, field in enumerate(structure_elements[5:]):
         text = texts[number * length : (number + 1) * length].split(b"\0")[0]
         # The name of the matrix in a field is empty.
-        found |= _read_matrix(field, order, f"{name}.{text.decode('ascii', 'replace')}")
+        found |= _read_numeric_matrix_or_structure(
+            field, byte_order, f"{structure_name}.{text.decode('ascii', 'replace')}"
+        )
     return found

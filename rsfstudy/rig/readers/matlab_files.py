@@ -11,15 +11,15 @@ import numpy as np
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.readers.matlab_elements import read_numeric_arrays
-from rsfstudy.rig.readers.missing_libraries import missing_library_error
-from rsfstudy.rig.readers.source import Source, Table, build_table_of_arrays
+from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
+from rsfstudy.rig.readers.source import SourceTable, TableSource, build_table_of_arrays
 
 _SIGNATURE_5, _SIGNATURE_7_3 = b"MATLAB 5.0", b"MATLAB 7.3"
 #: Maximum depth of nested structures, and maximum number of columns of a matrix.
 _MAX_DEPTH, _MAX_COLUMNS = 4, 200
 
 
-def is_matlab(source: Source) -> bool:
+def is_matlab_file(source: TableSource) -> bool:
     """Return True if the file is a MATLAB file of version 5 to 7.3.
 
     Parameters
@@ -32,10 +32,10 @@ def is_matlab(source: Source) -> bool:
     bool
         True if the file is a MATLAB file.
     """
-    return source.signature.startswith((_SIGNATURE_5, _SIGNATURE_7_3))
+    return source.first_bytes_of_file.startswith((_SIGNATURE_5, _SIGNATURE_7_3))
 
 
-def read_matlab(source: Source) -> Table:
+def read_matlab_file(source: TableSource) -> SourceTable:
     """Read the numeric arrays of a MATLAB file.
 
     The columns of the table are the vectors and the columns of matrices. The headings are the names
@@ -60,30 +60,38 @@ def read_matlab(source: Source) -> Table:
     InvalidValue
         If the file contains no numeric arrays.
     """
-    data = source.read_bytes()
-    is_hdf5 = source.signature.startswith(_SIGNATURE_7_3)
+    data = source.read_all_bytes()
+    is_hdf5 = source.first_bytes_of_file.startswith(_SIGNATURE_7_3)
     try:
-        variables = _read_version_7_3(data) if is_hdf5 else read_numeric_arrays(data)
+        variables = _read_matlab_7_3_arrays(data) if is_hdf5 else read_numeric_arrays(data)
     except ImportError as error:
-        raise missing_library_error(source, "a MATLAB file of v7.3", "hdf5", "h5py") from error
+        raise build_missing_library_error(
+            source, "a MATLAB file of v7.3", "hdf5", "h5py"
+        ) from error
     except Exception as error:  # Damaged files cause errors of many types.
-        raise DataError(f"{source.origin}: cannot be read as a MATLAB file ({error})") from error
-    columns = dict(_flatten(variables))
+        raise DataError(
+            f"{source.path_or_object}: cannot be read as a MATLAB file ({error})"
+        ) from error
+    columns = dict(_iterate_vectors_of_structures(variables))
     sizes = [len(array) for array in columns.values()]
     size = max(sizes, key=lambda n: (sizes.count(n), n), default=0)
     names = [name for name, array in columns.items() if len(array) == size]
     if not names:
         rule = "contains no vectors of numbers"
-        raise InvalidValue("record", str(source.origin), rule, remedy="Save one vector per column.")
+        raise InvalidValue(
+            "record", str(source.path_or_object), rule, remedy="Save one vector per column."
+        )
     names_of_fields = [name.rpartition(".")[2] for name in names]
     unique = [
         field if names_of_fields.count(field) == 1 else name
         for field, name in zip(names_of_fields, names, strict=True)
     ]
-    return build_table_of_arrays(unique, [columns[name] for name in names], str(source.origin))
+    return build_table_of_arrays(
+        unique, [columns[name] for name in names], str(source.path_or_object)
+    )
 
 
-def _read_version_7_3(data: bytes) -> dict[str, Any]:
+def _read_matlab_7_3_arrays(file_bytes: bytes) -> dict[str, Any]:
     h5py = importlib.import_module("h5py")
 
     def convert(group: Any, depth: int) -> dict[str, Any]:
@@ -99,23 +107,25 @@ def _read_version_7_3(data: bytes) -> dict[str, Any]:
                 found[name] = np.asarray(item).T
         return found
 
-    with h5py.File(io.BytesIO(data), "r") as file:
+    with h5py.File(io.BytesIO(file_bytes), "r") as file:
         return convert(file, 0)
 
 
-def _flatten(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, np.ndarray]]:
+def _iterate_vectors_of_structures(
+    variables: Mapping[str, Any], name_prefix: str = ""
+) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the numeric vectors of nested structures with their names."""
     for name, value in variables.items():
         if isinstance(value, Mapping):
-            if prefix.count(".") < _MAX_DEPTH:
-                yield from _flatten(value, f"{prefix}{name}.")
+            if name_prefix.count(".") < _MAX_DEPTH:
+                yield from _iterate_vectors_of_structures(value, f"{name_prefix}{name}.")
             continue
         array = np.asarray(value)
         if array.dtype.kind not in "fiu" or array.size < 2:
             continue
         array = array.squeeze()
         if array.ndim == 1:
-            yield f"{prefix}{name}", array
+            yield f"{name_prefix}{name}", array
         elif array.ndim == 2 and array.shape[1] <= _MAX_COLUMNS:
             for number, column in enumerate(array.T, start=1):
-                yield f"{prefix}{name}_{number}", column
+                yield f"{name_prefix}{name}_{number}", column

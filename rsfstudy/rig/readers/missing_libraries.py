@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from rsfstudy.errors import DataError
-from rsfstudy.rig.readers.source import Source
+from rsfstudy.rig.readers.source import TableSource
 
 
-def missing_library_error(source: Source, format_name: str, extra: str, library: str) -> DataError:
+def build_missing_library_error(
+    source: TableSource, format_name: str, extra_name: str, library_name: str
+) -> DataError:
     """Return the error for a file that requires an uninstalled library.
 
     Parameters
@@ -26,6 +28,6 @@ def missing_library_error(source: Source, format_name: str, extra: str, library:
         Error with the command that installs the library.
     """
     return DataError(
-        f"{source.origin}: is {format_name}, which requires the library {library}. Install the "
-        f"library: pip install 'rsfstudy[{extra}]'."
+        f"{source.path_or_object}: is {format_name}, which requires the library {library_name}. Install the "
+        f"library: pip install 'rsfstudy[{extra_name}]'."
     )

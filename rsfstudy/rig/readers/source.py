@@ -15,15 +15,15 @@ import numpy as np
 
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSpec, check_heading_lengths
-from rsfstudy.rig.units import find_size_of_units
+from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSelection, check_heading_lengths
+from rsfstudy.rig.units import find_si_factor_and_exponents
 
 #: Number of bytes at the beginning of a file that are used to recognise the format.
-_BYTES_OF_FILE_SIGNATURE = 8192
+_FILE_SIGNATURE_BYTE_COUNT = 8192
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class TableSource:
     """File or object that contains a table.
 
     Parameters
@@ -40,34 +40,34 @@ class Source:
         pass the decompressed bytes.
     """
 
-    origin: Any
-    decimal: str = "."
-    sheet: str = ""
-    content: bytes | None = None
+    path_or_object: Any
+    decimal_separator: str = "."
+    sheet_or_group_name: str = ""
+    file_bytes: bytes | None = None
 
     @property
     def is_file(self) -> bool:
         """True if the source is a file."""
-        return isinstance(self.origin, str | Path)
+        return isinstance(self.path_or_object, str | Path)
 
     @property
     def path(self) -> Path:
         """Path of the file."""
-        return Path(self.origin)
+        return Path(self.path_or_object)
 
     @cached_property
-    def signature(self) -> bytes:
+    def first_bytes_of_file(self) -> bytes:
         """First bytes of the file, or empty bytes if the source is an object."""
         if not self.is_file:
             return b""
-        if self.content is not None:
-            return self.content[:_BYTES_OF_FILE_SIGNATURE]
-        check_regular_file("record", self.origin)
+        if self.file_bytes is not None:
+            return self.file_bytes[:_FILE_SIGNATURE_BYTE_COUNT]
+        check_regular_file("record", self.path_or_object)
         if not self.path.exists():
-            raise DataError(f"the file {self.origin} does not exist")
-        return self._read(_BYTES_OF_FILE_SIGNATURE)
+            raise DataError(f"the file {self.path_or_object} does not exist")
+        return self._read_bytes_from_path(_FILE_SIGNATURE_BYTE_COUNT)
 
-    def read_bytes(self) -> bytes:
+    def read_all_bytes(self) -> bytes:
         """Return all bytes of the file.
 
         Returns
@@ -80,18 +80,18 @@ class Source:
         DataError
             If the file cannot be read.
         """
-        return self._read(-1) if self.content is None else self.content
+        return self._read_bytes_from_path(-1) if self.file_bytes is None else self.file_bytes
 
-    def _read(self, count: int) -> bytes:
+    def _read_bytes_from_path(self, byte_count: int) -> bytes:
         try:
             with self.path.open("rb") as file:
-                return file.read(count)
+                return file.read(byte_count)
         except OSError as error:
             raise DataError(f"{self.path}: cannot be read: {error.strerror}") from error
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class SourceTable:
     """Columns of a source, which are converted to numbers when selected.
 
     Parameters
@@ -120,26 +120,26 @@ class Table:
     """
 
     headings: Sequence[str]
-    location: str
-    load_values: Callable[[int, str], Column]
+    heading_location: str
+    load_column: Callable[[int, str], Column]
     has_headings: bool = True
-    default_units: bool = False
-    has_only_columns: bool = False
-    _indices: dict[str, list[int]] = field(default_factory=dict, init=False)
+    uses_default_units: bool = False
+    headings_are_column_names: bool = False
+    _column_indices_by_heading: dict[str, list[int]] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         """Check the lengths of the headings, and build the index of headings."""
-        check_heading_lengths(self.headings, self.location)
+        check_heading_lengths(self.headings, self.heading_location)
         names: dict[str, list[int]] = {}
         for index, heading in enumerate(self.headings):
-            self._indices.setdefault(heading, []).append(index)
+            self._column_indices_by_heading.setdefault(heading, []).append(index)
             if (match := HEADING_PATTERN.fullmatch(heading)) and match[1] != heading:
                 names.setdefault(match[1], []).append(index)
         # A complete heading takes precedence over a heading without its units.
         for name, indices in names.items():
-            self._indices.setdefault(name, indices)
+            self._column_indices_by_heading.setdefault(name, indices)
 
-    def find_column(self, heading: str) -> int:
+    def find_column_index(self, heading_or_number: str) -> int:
         """Return the index of a column.
 
         Parameters
@@ -157,11 +157,15 @@ class Table:
         InvalidValue
             If no column or more than one column has the heading.
         """
-        found = self._indices.get(heading, [])
+        found = self._column_indices_by_heading.get(heading_or_number, [])
         if len(found) == 1:
             return found[0]
-        if not found and heading.isdecimal() and 1 <= int(heading[:9]) <= len(self.headings):
-            return int(heading) - 1
+        if (
+            not found
+            and heading_or_number.isdecimal()
+            and 1 <= int(heading_or_number[:9]) <= len(self.headings)
+        ):
+            return int(heading_or_number) - 1
         rule = (
             (f"is the heading of {len(found)} columns, but must be the heading of exactly one")
             if found
@@ -169,10 +173,10 @@ class Table:
         )
         remedy = f"Columns can also be selected by their numbers, from 1 to {len(self.headings)}."
         raise InvalidValue(
-            "column", heading, rule, choices=self.headings, remedy=remedy
-        ).with_location(self.location)
+            "column", heading_or_number, rule, choices=self.headings, remedy=remedy
+        ).with_location(self.heading_location)
 
-    def units_of_heading(self, index: int) -> str:
+    def parse_units_of_heading(self, column_index: int) -> str:
         """Return the units in a heading.
 
         Parameters
@@ -185,10 +189,10 @@ class Table:
         str
             Units. The string is empty if the heading contains no units.
         """
-        match = HEADING_PATTERN.fullmatch(self.headings[index])
+        match = HEADING_PATTERN.fullmatch(self.headings[column_index])
         return (match[2] or "").strip() if match else ""
 
-    def read_column(self, quantity_name: str, selection: ColumnSpec) -> Column:
+    def read_column(self, quantity_name: str, column_selection: ColumnSelection) -> Column:
         """Read a selected column.
 
         Parameters
@@ -210,28 +214,28 @@ class Table:
             If the column does not exist, if the units of the selection contradict the units of the
             file, or if a value is not a number.
         """
-        heading, units, scale, offset = selection
-        index = self.find_column(heading)
-        of_file = self.units_of_heading(index)
-        if scale == 1.0 and _differ_in_size(units, of_file):
+        heading, units, scale, offset = column_selection
+        index = self.find_column_index(heading)
+        of_file = self.parse_units_of_heading(index)
+        if scale == 1.0 and _differ_in_conversion_factor(units, of_file):
             remedy = f"Write '{self.headings[index]}', or correct the heading in the file."
             raise InvalidValue(
                 quantity_name, units, f"contradicts the units in the file, {of_file}", remedy=remedy
-            ).with_location(self.location)
-        column = self.load_values(index, quantity_name)
+            ).with_location(self.heading_location)
+        column = self.load_column(index, quantity_name)
         values = column.values
         if (scale, offset) != (1.0, 0.0):
             values = values * scale + offset
         return column._replace(values=values, units=column.units or units or of_file)
 
 
-def _differ_in_size(units: str, other_units: str) -> bool:
+def _differ_in_conversion_factor(units: str, other_units: str) -> bool:
     """Return True if two compatible units have different conversion factors."""
-    one, other = find_size_of_units(units), find_size_of_units(other_units)
+    one, other = find_si_factor_and_exponents(units), find_si_factor_and_exponents(other_units)
     return one is not None and other is not None and one[1] == other[1] and one[0] != other[0]
 
 
-def merge_headings_with_units(headings: Sequence[str], units: Sequence[str]) -> list[str]:
+def append_units_to_headings(headings: Sequence[str], units: Sequence[str]) -> list[str]:
     """Add units to headings that contain no units.
 
     Parameters
@@ -251,8 +255,8 @@ def merge_headings_with_units(headings: Sequence[str], units: Sequence[str]) -> 
 
 
 def build_table_of_arrays(
-    names: Sequence[str], values: Sequence[np.ndarray], location: str, path: str = ""
-) -> Table:
+    headings: Sequence[str], column_arrays: Sequence[np.ndarray], location: str, path: str = ""
+) -> SourceTable:
     """Build a table of numeric arrays.
 
     Parameters
@@ -273,7 +277,7 @@ def build_table_of_arrays(
     """
 
     def load(index: int, quantity_name: str) -> Column:
-        array = values[index]
+        array = column_arrays[index]
         if array.dtype.kind not in "fiub":
             raise InvalidValue(
                 quantity_name, array.dtype.name, "must be real numbers"
@@ -281,4 +285,4 @@ def build_table_of_arrays(
         rows = np.arange(1, len(array) + 1)
         return Column(array.astype(float), "", index + 1, rows, path)
 
-    return Table(names, location, load)
+    return SourceTable(headings, location, load)

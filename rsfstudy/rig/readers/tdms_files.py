@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.readers.missing_libraries import missing_library_error
+from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
 from rsfstudy.rig.readers.source import (
-    Source,
-    Table,
+    SourceTable,
+    TableSource,
+    append_units_to_headings,
     build_table_of_arrays,
-    merge_headings_with_units,
 )
 
-_SIGNATURE = b"TDSm"
+_TDMS_FILE_SIGNATURE = b"TDSm"
 #: Names of the channel properties that contain the units and the sampling interval.
-_PROPERTIES_OF_UNITS = ("unit_string", "NI_UnitDescription", "units", "unit")
-_PROPERTY_OF_INTERVAL = "wf_increment"
+_UNIT_PROPERTY_NAMES = ("unit_string", "NI_UnitDescription", "units", "unit")
+_SAMPLING_INTERVAL_PROPERTY_NAME = "wf_increment"
 
 
-def is_tdms(source: Source) -> bool:
+def is_tdms_file(source: TableSource) -> bool:
     """Return True if the file is a TDMS file.
 
     Parameters
@@ -37,10 +37,10 @@ def is_tdms(source: Source) -> bool:
     bool
         True if the file is a TDMS file.
     """
-    return source.signature.startswith(_SIGNATURE)
+    return source.first_bytes_of_file.startswith(_TDMS_FILE_SIGNATURE)
 
 
-def read_tdms(source: Source) -> Table:
+def read_tdms_file(source: TableSource) -> SourceTable:
     """Read the channels of a group of a TDMS file.
 
     If the channels are waveforms, a column ``Time (s)`` is added.
@@ -65,33 +65,37 @@ def read_tdms(source: Source) -> Table:
     try:
         nptdms = importlib.import_module("nptdms")
     except ImportError as error:
-        raise missing_library_error(source, "a TDMS file", "tdms", "npTDMS") from error
+        raise build_missing_library_error(source, "a TDMS file", "tdms", "npTDMS") from error
     level = logging.root.manager.disable
     logging.disable(logging.WARNING)  # npTDMS prints the bytes of damaged files.
     try:
-        file = nptdms.TdmsFile.read(io.BytesIO(source.read_bytes()))
+        file = nptdms.TdmsFile.read(io.BytesIO(source.read_all_bytes()))
     except Exception as error:  # Damaged files cause errors of many types.
-        raise DataError(f"{source.origin}: cannot be read as a TDMS file ({error})") from error
+        raise DataError(
+            f"{source.path_or_object}: cannot be read as a TDMS file ({error})"
+        ) from error
     finally:
         logging.disable(level)
     groups = {group.name: group.channels() for group in file.groups()}
     names = [name for name, channels in groups.items() if channels]
-    if not names or (source.sheet and source.sheet not in names):
-        raise InvalidValue("sheet", source.sheet, "is not a group with channels", choices=names)
-    channels = groups[source.sheet or names[0]]
-    headings = merge_headings_with_units(
-        [channel.name for channel in channels], [_units_of_channel(of) for of in channels]
+    if not names or (source.sheet_or_group_name and source.sheet_or_group_name not in names):
+        raise InvalidValue(
+            "sheet", source.sheet_or_group_name, "is not a group with channels", choices=names
+        )
+    channels = groups[source.sheet_or_group_name or names[0]]
+    headings = append_units_to_headings(
+        [channel.name for channel in channels], [_find_units_of_channel(of) for of in channels]
     )
     values = [np.asarray(channel[:]) for channel in channels]
-    intervals = {float(of.properties.get(_PROPERTY_OF_INTERVAL, 0.0)) for of in channels}
+    intervals = {float(of.properties.get(_SAMPLING_INTERVAL_PROPERTY_NAME, 0.0)) for of in channels}
     if len(intervals) == 1 and (interval := intervals.pop()) > 0.0:
         headings = ["Time (s)", *headings]
         values = [interval * np.arange(len(values[0])), *values]
-    return build_table_of_arrays(headings, values, str(source.origin))
+    return build_table_of_arrays(headings, values, str(source.path_or_object))
 
 
-def _units_of_channel(channel: Any) -> str:
+def _find_units_of_channel(channel: Any) -> str:
     return next(
-        (str(channel.properties[name]) for name in _PROPERTIES_OF_UNITS
+        (str(channel.properties[name]) for name in _UNIT_PROPERTY_NAMES
          if channel.properties.get(name)), "",
     )  # fmt: skip

@@ -14,22 +14,22 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.readers.source import merge_headings_with_units
-from rsfstudy.rig.units import find_size_of_units, parse_number
+from rsfstudy.rig.readers.source import append_units_to_headings
+from rsfstudy.rig.units import find_si_factor_and_exponents, parse_number
 
 #: Delimiter of files in which one or more blanks separate the columns.
-BLANKS = " "
+BLANK_DELIMITER = " "
 #: First characters of comment lines.
-COMMENT_MARKS = ("#", "%")
+COMMENT_LINE_PREFIXES = ("#", "%")
 #: Maximum number of lines that are compared to detect the layout.
-_MAX_COMPARED_LINES = 1000
+_MAX_LINES_FOR_LAYOUT_DETECTION = 1000
 #: Maximum number of characters of a number in the compared lines.
 _MAX_NUMBER_LENGTH = 50
-_SEPARATOR_LINE_PATTERN = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
+_DELIMITER_DECLARATION_PATTERN = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 _DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?")
-_RULE_PATTERN = re.compile(r"[-=_+|* \t]{3,}")
+_HORIZONTAL_RULE_PATTERN = re.compile(r"[-=_+|* \t]{3,}")
 #: Names of units that often occur below headings, although rsfstudy cannot convert them.
-_OTHER_UNITS = frozenset(
+_UNCONVERTIBLE_UNIT_NAMES = frozenset(
     ("", "-", ".", "1", "none", "v", "mv", "bit", "bits", "counts", "degc", "°c", "c", "hz", "nr")
 )
 
@@ -52,11 +52,11 @@ class TextLayout(NamedTuple):
 
     delimiter: str
     headings: list[str]
-    header_line: int
-    body_line: int
+    header_line_number: int
+    first_line_number_after_header: int
 
 
-def is_comment_or_rule(line: str) -> bool:
+def is_line_without_data(line: str) -> bool:
     """Return True if a line is blank, a comment, or a horizontal rule such as ``-----``.
 
     Parameters
@@ -70,10 +70,14 @@ def is_comment_or_rule(line: str) -> bool:
         True if the line contains no data.
     """
     bare = line.strip()
-    return not bare or bare.startswith(COMMENT_MARKS) or bool(_RULE_PATTERN.fullmatch(bare))
+    return (
+        not bare
+        or bare.startswith(COMMENT_LINE_PREFIXES)
+        or bool(_HORIZONTAL_RULE_PATTERN.fullmatch(bare))
+    )
 
 
-def split_fields(line: str, delimiter: str) -> list[str]:
+def split_line_into_fields(line: str, delimiter: str) -> list[str]:
     """Split a line into fields.
 
     Parameters
@@ -88,12 +92,12 @@ def split_fields(line: str, delimiter: str) -> list[str]:
     list of str
         Fields without surrounding blanks.
     """
-    if delimiter == BLANKS:
+    if delimiter == BLANK_DELIMITER:
         return line.split()
     return [field.strip() for row in csv.reader([line], delimiter=delimiter) for field in row]
 
 
-def detect_layout(lines: Sequence[str], decimal: str) -> TextLayout:
+def detect_text_layout(lines: Sequence[str], decimal_separator: str) -> TextLayout:
     """Detect the layout of a text file from its first lines.
 
     Parameters
@@ -113,45 +117,45 @@ def detect_layout(lines: Sequence[str], decimal: str) -> TextLayout:
     InvalidValue
         If numbers have decimal commas and ``decimal`` is a point.
     """
-    lines = lines[:_MAX_COMPARED_LINES]
-    skipped, stated = _find_separator_line(lines)
-    candidates = [stated] if stated else ["\t", ";", BLANKS, ","]
+    lines = lines[:_MAX_LINES_FOR_LAYOUT_DETECTION]
+    skipped, stated = _find_declared_delimiter(lines)
+    candidates = [stated] if stated else ["\t", ";", BLANK_DELIMITER, ","]
     for delimiter in candidates:
-        if delimiter == decimal:
+        if delimiter == decimal_separator:
             continue
         rows = [
-            [] if is_comment_or_rule(line) else split_fields(line, delimiter)
+            [] if is_line_without_data(line) else split_line_into_fields(line, delimiter)
             for line in lines[skipped:]
         ]
-        sizes = Counter(len(row) for row in rows if _is_row_of_numbers(row, decimal))
-        if decimal == "." and delimiter != ",":
-            _check_decimal_commas(rows, sizes)
+        sizes = Counter(len(row) for row in rows if _is_row_mostly_numbers(row, decimal_separator))
+        if decimal_separator == "." and delimiter != ",":
+            _raise_if_decimal_commas(rows, sizes)
         size = max(sizes, key=lambda n: (sizes[n], n), default=0)
         if size > 1 or (size == 1 and delimiter == candidates[-1]):
             first = next(
                 n for n, row in enumerate(rows, skipped)
-                if len(row) == size and _is_row_of_numbers(row, decimal)
+                if len(row) == size and _is_row_mostly_numbers(row, decimal_separator)
             )  # fmt: skip
-            return _find_header(lines, skipped, first, delimiter, size)
-    return _layout_without_numbers(lines, skipped, stated)
+            return _find_header_before_first_row(lines, skipped, first, delimiter, size)
+    return _detect_layout_without_numbers(lines, skipped, stated)
 
 
-def _find_separator_line(lines: Sequence[str]) -> tuple[int, str]:
+def _find_declared_delimiter(lines: Sequence[str]) -> tuple[int, str]:
     """Return the number of lines before the table, and the declared delimiter.
 
     Spreadsheet programs declare the delimiter in a line such as ``sep=;``.
     """
     for number, line in enumerate(lines):
         if line.strip():
-            match = _SEPARATOR_LINE_PATTERN.fullmatch(line.strip("\r\n"))
+            match = _DELIMITER_DECLARATION_PATTERN.fullmatch(line.strip("\r\n"))
             return (number + 1, match[1]) if match else (0, "")
     return 0, ""
 
 
-def _is_row_of_numbers(fields: Sequence[str], decimal: str) -> bool:
+def _is_row_mostly_numbers(fields: Sequence[str], decimal_separator: str) -> bool:
     """Return True if more than half of the non-empty fields are numbers."""
     texts = [text for text in fields if text]
-    if decimal == ",":
+    if decimal_separator == ",":
         texts = [text if "." in text else text.replace(",", ".", 1) for text in texts]
     return 2 * sum(map(_is_number, texts)) > len(texts)
 
@@ -160,7 +164,9 @@ def _is_number(text: str) -> bool:
     return len(text) < _MAX_NUMBER_LENGTH and parse_number(text) is not None
 
 
-def _check_decimal_commas(rows: Sequence[Sequence[str]], sizes: Counter[int]) -> None:
+def _raise_if_decimal_commas(
+    rows: Sequence[Sequence[str]], row_count_by_length: Counter[int]
+) -> None:
     """Raise ``InvalidValue`` if most rows consist of numbers with decimal commas."""
     commas = [
         row
@@ -169,14 +175,14 @@ def _check_decimal_commas(rows: Sequence[Sequence[str]], sizes: Counter[int]) ->
         and any(_DECIMAL_COMMA_PATTERN.fullmatch(text) for text in row)
         and all(not t or _DECIMAL_COMMA_PATTERN.fullmatch(t) or _is_number(t) for t in row)
     ]
-    if len(commas) > sum(sizes.values()):
+    if len(commas) > sum(row_count_by_length.values()):
         number = next(text for text in commas[0] if "," in text)
         remedy = "Pass decimal=',' (--decimal ','), or write decimal points."
         raise InvalidValue("number", number, "has a decimal comma", remedy=remedy)
 
 
-def _find_header(
-    lines: Sequence[str], first_line: int, first_row: int, delimiter: str, size: int
+def _find_header_before_first_row(
+    lines: Sequence[str], first_line: int, first_row: int, delimiter: str, column_count: int
 ) -> TextLayout:
     """Find the header before the first row of numbers.
 
@@ -185,39 +191,40 @@ def _find_header(
     texts = [
         (number, fields)
         for number, line in enumerate(lines[:first_row])
-        if number >= first_line and (fields := _split_header(line, delimiter, size))
+        if number >= first_line
+        and (fields := _split_line_into_headings(line, delimiter, column_count))
     ]
-    whole = [(number, fields) for number, fields in texts if len(fields) == size]
+    whole = [(number, fields) for number, fields in texts if len(fields) == column_count]
     # A comment or a single word before the table is not a header.
     whole = whole or [
         (number, fields)
         for number, fields in texts
         if (len(fields) > 1 or fields[0].endswith((")", "]")))
-        and not lines[number].lstrip().startswith(COMMENT_MARKS)
+        and not lines[number].lstrip().startswith(COMMENT_LINE_PREFIXES)
     ]
     if not whole:
-        return TextLayout(delimiter, [str(n + 1) for n in range(size)], 0, first_row + 1)
+        return TextLayout(delimiter, [str(n + 1) for n in range(column_count)], 0, first_row + 1)
     at, headings = whole[-1]
     body = at + 1
-    if len(whole) > 1 and len(whole[-2][1]) == len(headings) and _are_units(headings):
-        headings = merge_headings_with_units(whole[-2][1], headings)
+    if len(whole) > 1 and len(whole[-2][1]) == len(headings) and _look_like_units(headings):
+        headings = append_units_to_headings(whole[-2][1], headings)
         at = whole[-2][0]
     return TextLayout(delimiter, headings, at + 1, body + 1)
 
 
-def _split_header(line: str, delimiter: str, size: int) -> list[str]:
+def _split_line_into_headings(line: str, delimiter: str, column_count: int) -> list[str]:
     """Split a line of text into headings.
 
     If possible, the header is split into as many headings as there are fields in a row. The list is
     empty if the line contains no text, or if the line contains a number.
     """
-    text = line.strip().lstrip("".join(COMMENT_MARKS)).strip()
-    if not text or _RULE_PATTERN.fullmatch(text):
+    text = line.strip().lstrip("".join(COMMENT_LINE_PREFIXES)).strip()
+    if not text or _HORIZONTAL_RULE_PATTERN.fullmatch(text):
         return []
     first: list[str] = []
-    for fields in _split_in_several_ways(text, delimiter):
+    for fields in _iterate_possible_header_splits(text, delimiter):
         first = first or fields
-        if len(fields) == size:
+        if len(fields) == column_count:
             first = fields
             break
     fields = first
@@ -225,28 +232,28 @@ def _split_header(line: str, delimiter: str, size: int) -> list[str]:
     return [] if has_number or not any(fields) else fields
 
 
-def _split_in_several_ways(text: str, delimiter: str) -> Iterator[list[str]]:
+def _iterate_possible_header_splits(text: str, delimiter: str) -> Iterator[list[str]]:
     """Yield the headings of a header, split at each of several delimiters."""
-    if delimiter == BLANKS:
-        yield from _split_at_blanks(text)
+    if delimiter == BLANK_DELIMITER:
+        yield from _iterate_header_splits_at_blanks(text)
     for mark in (delimiter, "\t", ";", ","):
-        if mark != BLANKS:
-            yield split_fields(text, mark)
+        if mark != BLANK_DELIMITER:
+            yield split_line_into_fields(text, mark)
     yield re.split(r"\s{2,}", text)
-    if delimiter != BLANKS:
-        yield from _split_at_blanks(text)
+    if delimiter != BLANK_DELIMITER:
+        yield from _iterate_header_splits_at_blanks(text)
 
 
-def _split_at_blanks(text: str) -> Iterator[list[str]]:
+def _iterate_header_splits_at_blanks(text: str) -> Iterator[list[str]]:
     """Split a header in which blanks separate the headings and the units."""
     words = text.split()
-    yield _merge_brackets(words)
+    yield _append_bracketed_units_to_words(words)
     yield re.split(r"(?<=[)\]])\s+", text)
     if len({word.startswith(("(", "[")) for word in words}) == 1:
         yield words
 
 
-def _merge_brackets(words: Sequence[str]) -> list[str]:
+def _append_bracketed_units_to_words(words: Sequence[str]) -> list[str]:
     """Append units in brackets to the words before the units."""
     groups: list[list[str]] = []
     depth = 0
@@ -259,25 +266,31 @@ def _merge_brackets(words: Sequence[str]) -> list[str]:
     return [" ".join(group) for group in groups]
 
 
-def _are_units(fields: Sequence[str]) -> bool:
+def _look_like_units(fields: Sequence[str]) -> bool:
     """Return True if all fields of a line look like units, and at least one unit is known."""
     bare = [text.strip(" ()[]") for text in fields]
-    known = [find_size_of_units(text) is not None for text in bare]
+    known = [find_si_factor_and_exponents(text) is not None for text in bare]
     return any(known) and all(
-        found or text.lower() in _OTHER_UNITS for found, text in zip(known, bare, strict=True)
+        found or text.lower() in _UNCONVERTIBLE_UNIT_NAMES
+        for found, text in zip(known, bare, strict=True)
     )
 
 
-def _layout_without_numbers(lines: Sequence[str], first_line: int, stated: str) -> TextLayout:
+def _detect_layout_without_numbers(
+    lines: Sequence[str], first_line: int, declared_delimiter: str
+) -> TextLayout:
     """Return the layout of a file without rows of numbers.
 
     The header is the first line that is not blank.
     """
     for number, line in enumerate(lines):
-        text = line.strip().lstrip("".join(COMMENT_MARKS)).strip()
+        text = line.strip().lstrip("".join(COMMENT_LINE_PREFIXES)).strip()
         if number >= first_line and text:
-            delimiter = stated or next(
-                (mark for mark in "\t;," if mark in text), "," if {"(", "["} & {*text} else BLANKS
+            delimiter = declared_delimiter or next(
+                (mark for mark in "\t;," if mark in text),
+                "," if {"(", "["} & {*text} else BLANK_DELIMITER,
             )
-            return TextLayout(delimiter, split_fields(text, delimiter), number + 1, number + 2)
+            return TextLayout(
+                delimiter, split_line_into_fields(text, delimiter), number + 1, number + 2
+            )
     return TextLayout(",", [], 1, 1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from rsfstudy.errors import DataError
 from rsfstudy.rig.columns import Column
-from rsfstudy.rig.readers.source import Source, Table, merge_headings_with_units
+from rsfstudy.rig.readers.source import SourceTable, TableSource, append_units_to_headings
 
 #: Layout of xlook files. The constants are the size of the file header in bytes, the size of each
 #: column header in bytes, and the number of column headers. The data of an xlook file follow the
@@ -14,10 +14,10 @@ from rsfstudy.rig.readers.source import Source, Table, merge_headings_with_units
 _HEADER_BYTES, _COLUMN_HEADER_BYTES, _MAX_COLUMNS = 36, 84, 32
 _DATA_START_BYTE = _HEADER_BYTES + _COLUMN_HEADER_BYTES * _MAX_COLUMNS
 #: List of supported formats for the error message about other formats.
-_FORMATS = "text, Excel, MATLAB, TDMS, NetCDF and xlook"
+_READABLE_FORMATS_FOR_MESSAGE = "text, Excel, MATLAB, TDMS, NetCDF and xlook"
 
 
-def is_binary(source: Source) -> bool:
+def is_binary_file(source: TableSource) -> bool:
     """Return True if the beginning of a file contains a null byte.
 
     The xlook format has no signature. For this reason, all other binary formats must be tested
@@ -33,10 +33,10 @@ def is_binary(source: Source) -> bool:
     bool
         True if the file may be an xlook file.
     """
-    return b"\0" in source.signature[:_DATA_START_BYTE]
+    return b"\0" in source.first_bytes_of_file[:_DATA_START_BYTE]
 
 
-def read_xlook(source: Source) -> Table:
+def read_xlook_file(source: TableSource) -> SourceTable:
     """Read a binary xlook file.
 
     The file is big-endian. The file contains a file header, column headers of 84 bytes each, and
@@ -58,11 +58,11 @@ def read_xlook(source: Source) -> Table:
     DataError
         If the file is not an xlook file, or if the file is truncated.
     """
-    data, path = source.read_bytes(), source.origin
+    data, path = source.read_all_bytes(), source.path_or_object
     used = int.from_bytes(data[24:28], "big")
     if not 0 < used <= _MAX_COLUMNS:
         raise DataError(
-            f"{path}: has an unknown binary format. Formats that can be read: {_FORMATS}. "
+            f"{path}: has an unknown binary format. Formats that can be read: {_READABLE_FORMATS_FOR_MESSAGE}. "
             "Export the table as a CSV file. If the file were an xlook file, it would have "
             f"{used} columns."
         )
@@ -94,4 +94,4 @@ def read_xlook(source: Source) -> Table:
         values = np.cumsum(values) if quantity_name == "time" else values
         return Column(values, "", index + 1)
 
-    return Table(merge_headings_with_units(names, units), str(path), load)
+    return SourceTable(append_units_to_headings(names, units), str(path), load)

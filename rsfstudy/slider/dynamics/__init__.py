@@ -13,7 +13,7 @@ from typing import ClassVar
 
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.needed_quantities import QUANTITIES_A_PART_MAY_NEED
-from rsfstudy.slider.parts import Function, Part, discover_parts
+from rsfstudy.slider.parts import NumericFunction, Part, discover_parts
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -51,8 +51,8 @@ class Dynamics(Part):
     #: Name of the equations of motion between ruptures. The name appears in results.
     regime: ClassVar[str]
     received_quantities = frozenset(QUANTITIES_A_PART_MAY_NEED)
-    build_slip_rate_functions: ClassVar[Function]
-    build_rupture_rate_function: ClassVar[Function | None] = None
+    build_slip_rate_functions: ClassVar[NumericFunction]
+    build_rupture_rate_function: ClassVar[NumericFunction | None] = None
     #: True if slip may reverse in scenes with the regularised friction law.
     allows_reversed_slip: ClassVar[bool] = False
 
@@ -116,4 +116,4 @@ class Dynamics(Part):
         return 0.0
 
 
-BUILT_IN_PARTS = discover_parts(__name__, __path__)
+BUILT_IN_DYNAMICS_CLASS_BY_NAME = discover_parts(__name__, __path__)

@@ -16,20 +16,20 @@ from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.parameter_layout import (
     DYNAMICS,
-    LARGEST_LOG_SLIP_RATE,
     LOAD_VELOCITY,
+    LOG_SLIP_RATE_UPPER_LIMIT,
     STIFFNESS,
     A,
 )
-from rsfstudy.slider.parts import Function, Numbers, flag
-from rsfstudy.slider.path_length import velocity_ratios
+from rsfstudy.slider.parts import FloatTuple, NumericFunction, flag
+from rsfstudy.slider.path_length import compute_velocity_ratios
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.state_functions import build_state_step_function
+from rsfstudy.slider.state_functions import build_function_adding_step_to_states
 
 #: Upper limit of the rates of the unknowns per unit of inertial time. Larger rates occur only in
 #: trial steps of the integrator. A motion returns to the slow manifold long before its slip rate
 #: changes at such a large rate.
-MAX_RATE_PER_INERTIAL_TIME = 1e30
+MAX_RATE_OF_UNKNOWNS_PER_INERTIAL_TIME = 1e30
 #: If the inertia weight is less than the first constant, the second-order term of the slow manifold
 #: is negligible. If the inertia weight is less than the second constant, the derivative of the
 #: first-order term is negligible. The third constant is the displacement step of difference
@@ -41,7 +41,9 @@ NEGLIGIBLE_SECOND_ORDER_WEIGHT, NEGLIGIBLE_GROWTH_WEIGHT, DIFFERENCE_STEP = 1e-7
 MIN_VELOCITY_RATIO, MAX_VELOCITY_RATIO = 1e-60, 1e40
 
 
-def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
+def build_slow_manifold_slip_rate_functions(
+    friction_functions: FrictionFunctions,
+) -> tuple[NumericFunction, NumericFunction]:
     r"""Return the functions that compute the slip rate on the slow manifold.
 
     See ``Dynamics`` for the argument and for the returned functions.
@@ -98,15 +100,17 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     strength, state_sum, evolutions = (
         friction_functions.strength,
         friction_functions.state_sum,
-        friction_functions.evolutions,
+        friction_functions.state_evolutions,
     )
     contribution, spring_stress_rate, ahead = (
-        friction_functions.state_contribution,
+        friction_functions.state_contribution_to_friction,
         friction_functions.spring_stress_rate,
-        build_state_step_function(friction_functions.state_count),
+        build_function_adding_step_to_states(friction_functions.state_count),
     )
 
-    def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+    def balance(
+        spring_stress: float, psis: FloatTuple, p: FloatTuple
+    ) -> tuple[float, float, float]:
         alone = quasi_static_values(spring_stress, psis, p)
         g = spring_stress - inertial_stress(spring_stress, psis, alone, p)
         if g == spring_stress:  # The effect of inertia is below the rounding error.
@@ -114,17 +118,19 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         value, _slope, shift, _shift_slope = strength(g, psis, p)
         return (value - state_sum(psis)) / p[A], g, shift
 
-    def inertial_stress(spring_stress: float, psis: Numbers, alone: Numbers, p: Numbers) -> float:
+    def inertial_stress(
+        spring_stress: float, psis: FloatTuple, alone: FloatTuple, p: FloatTuple
+    ) -> float:
         """Compute the stress in sigma_* that accelerates the mass.
 
         The argument for the quasi-static motion is the tuple returned by ``quasi_static_values``.
         """
         x, growing, slope, weight, _shift = alone
-        first = clamped_inertial_stress(weight, growing, p)
+        first = compute_clamped_inertial_stress(weight, growing, p)
         if weight <= NEGLIGIBLE_SECOND_ORDER_WEIGHT:
             return first
         trails = slope * first / p[A]
-        ratios = velocity_ratios(x - trails, p)
+        ratios = compute_velocity_ratios(x - trails, p)
         slowed, slower, fraction = ratios
         shift = strength(spring_stress - first, psis, p)[2]
         loading = spring_stress_rate(slower, 1.0, ratios, p)
@@ -133,14 +139,16 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         _x, growing_ahead, slope_ahead, weight_ahead, _shift = quasi_static_values(
             spring_stress + DIFFERENCE_STEP * loading, ahead(psis, changes, DIFFERENCE_STEP), p
         )
-        trails_ahead = slope_ahead * clamped_inertial_stress(weight_ahead, growing_ahead, p) / p[A]
-        return clamped_inertial_stress(
+        trails_ahead = (
+            slope_ahead * compute_clamped_inertial_stress(weight_ahead, growing_ahead, p) / p[A]
+        )
+        return compute_clamped_inertial_stress(
             compute_inertia_weight(slowed, slower, p),
             growing - (trails_ahead - trails) / DIFFERENCE_STEP,
             p,
         )
 
-    def quasi_static_values(spring_stress: float, psis: Numbers, p: Numbers) -> Numbers:
+    def quasi_static_values(spring_stress: float, psis: FloatTuple, p: FloatTuple) -> FloatTuple:
         """Compute the quasi-static motion and the inertia weight.
 
         The returned tuple contains ln(V/V_*), its derivative, the slope of the strength, the
@@ -149,14 +157,14 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         a = p[A]
         value, slope, shift, _shift_slope = strength(spring_stress, psis, p)
         x = (value - state_sum(psis)) / a
-        ratios = velocity_ratios(x, p)
+        ratios = compute_velocity_ratios(x, p)
         clamped, slower, fraction = ratios
         loading = spring_stress_rate(slower, 1.0, ratios, p)
         changes = evolutions(clamped, psis, shift, fraction, p)
         growing = (slope * loading - contribution(changes, spring_stress, psis, p)) / a
         return x, growing, slope, compute_inertia_weight(x, slower, p), shift
 
-    def log_slip_rate_offset(spring_stress: float, psis: Numbers, p: Numbers) -> float:
+    def log_slip_rate_offset(spring_stress: float, psis: FloatTuple, p: FloatTuple) -> float:
         """Compute the difference between ln V and its quasi-static value.
 
         The function does not subtract two values of ln V, because rounding errors would then affect
@@ -165,7 +173,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         taken = inertial_stress(spring_stress, psis, quasi_static_values(spring_stress, psis, p), p)
         return -strength(spring_stress - 0.5 * taken, psis, p)[1] * taken / p[A]
 
-    def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
+    def growth(state: FloatTuple, rates: FloatTuple, x: float, g: float, p: FloatTuple) -> float:
         """Compute the derivative of ln V along the motion.
 
         The derivative includes the change of ``log_slip_rate_offset``. Without this contribution,
@@ -174,7 +182,10 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         spring_stress, psis = state[0], state[1:]
         slope = strength(spring_stress, psis, p)[1]
         quasi_static = (slope * rates[0] - contribution(rates[1:], spring_stress, psis, p)) / p[A]
-        if compute_inertia_weight(x, velocity_ratios(x, p)[1], p) <= NEGLIGIBLE_GROWTH_WEIGHT:
+        if (
+            compute_inertia_weight(x, compute_velocity_ratios(x, p)[1], p)
+            <= NEGLIGIBLE_GROWTH_WEIGHT
+        ):
             return quasi_static
         then = log_slip_rate_offset(
             spring_stress + DIFFERENCE_STEP * rates[0], ahead(psis, rates[1:], DIFFERENCE_STEP), p
@@ -186,8 +197,8 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     return balance, growth
 
 
-def clamped_inertial_stress(
-    inertia_weight: float, log_slip_rate_derivative: float, p: Numbers
+def compute_clamped_inertial_stress(
+    inertia_weight: float, log_slip_rate_derivative: float, p: FloatTuple
 ) -> float:
     r"""Compute the bounded stress that accelerates the mass.
 
@@ -214,7 +225,7 @@ def clamped_inertial_stress(
 
 
 def compute_inertia_weight(
-    log_slip_rate: float, load_to_slip_velocity_ratio: float, p: Numbers
+    log_slip_rate: float, load_to_slip_velocity_ratio: float, p: FloatTuple
 ) -> float:
     r"""Compute the inertia weight, which measures the effect of the mass.
 
@@ -240,11 +251,11 @@ def compute_inertia_weight(
     if MIN_VELOCITY_RATIO < load_to_slip_velocity_ratio < MAX_VELOCITY_RATIO:
         norm = load / load_to_slip_velocity_ratio
     else:
-        norm = math.exp(min(log_slip_rate + p[DYNAMICS + 1], LARGEST_LOG_SLIP_RATE / 4.0))
+        norm = math.exp(min(log_slip_rate + p[DYNAMICS + 1], LOG_SLIP_RATE_UPPER_LIMIT / 4.0))
     return p[STIFFNESS] / p[A] * norm * (norm + load)
 
 
-def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Function:
+def build_rupture_rate_function(friction_functions: FrictionFunctions) -> NumericFunction:
     r"""Return the rate function of the inertial equations of motion.
 
     The unknowns are :math:`f`, :math:`x = \ln(V/V_*)`, :math:`g` and all states except the first.
@@ -271,22 +282,25 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Functi
           S'(g) \, \dot{g} = a \dot{x} + w \frac{d\Psi}{d\delta}.
     """
     strength, states_at = friction_functions.strength, friction_functions.states_from_strength
-    evolutions, contribution = friction_functions.evolutions, friction_functions.state_contribution
+    evolutions, contribution = (
+        friction_functions.state_evolutions,
+        friction_functions.state_contribution_to_friction,
+    )
 
-    def rates(state: Numbers, p: Numbers) -> Numbers:
+    def rates(state: FloatTuple, p: FloatTuple) -> FloatTuple:
         spring_stress, x, g, others = state[0], state[1], state[2], state[3:]
         a, stiffness = p[A], p[STIFFNESS]
         log_norm = x + p[DYNAMICS + 1]
-        if abs(log_norm) > LARGEST_LOG_SLIP_RATE:
-            log_norm = math.copysign(LARGEST_LOG_SLIP_RATE, log_norm)
+        if abs(log_norm) > LOG_SLIP_RATE_UPPER_LIMIT:
+            log_norm = math.copysign(LOG_SLIP_RATE_UPPER_LIMIT, log_norm)
         norm = math.exp(log_norm)
         value, slope, shift, _shift_slope = strength(g, others, p)
-        faster = limit_rate_per_inertial_time((spring_stress - g) / (stiffness * norm))
+        faster = clamp_rate_per_inertial_time((spring_stress - g) / (stiffness * norm))
         changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)
         return (
-            limit_rate_per_inertial_time(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
+            clamp_rate_per_inertial_time(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
             faster,
-            limit_rate_per_inertial_time(
+            clamp_rate_per_inertial_time(
                 (a * faster + contribution(changes, g, others, p)) / slope
             ),
             *changes[1:],
@@ -295,7 +309,7 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Functi
     return rates
 
 
-def limit_rate_per_inertial_time(rate: float) -> float:
+def clamp_rate_per_inertial_time(rate: float) -> float:
     """Limit the magnitude of a rate to ``MAX_RATE_PER_INERTIAL_TIME``.
 
     Parameters
@@ -310,8 +324,11 @@ def limit_rate_per_inertial_time(rate: float) -> float:
     """
     return (
         rate
-        if abs(rate) < MAX_RATE_PER_INERTIAL_TIME
-        else max(min(rate, MAX_RATE_PER_INERTIAL_TIME), -MAX_RATE_PER_INERTIAL_TIME)
+        if abs(rate) < MAX_RATE_OF_UNKNOWNS_PER_INERTIAL_TIME
+        else max(
+            min(rate, MAX_RATE_OF_UNKNOWNS_PER_INERTIAL_TIME),
+            -MAX_RATE_OF_UNKNOWNS_PER_INERTIAL_TIME,
+        )
     )
 
 
@@ -339,7 +356,7 @@ class Inertia(Dynamics):
     name = "inertia"
     selected_by = "inertia"
     regime = "slow_manifold"
-    build_slip_rate_functions = staticmethod(build_slip_rate_functions)
+    build_slip_rate_functions = staticmethod(build_slow_manifold_slip_rate_functions)
     build_rupture_rate_function = staticmethod(build_rupture_rate_function)
 
     @property
@@ -347,7 +364,7 @@ class Inertia(Dynamics):
         """Names of the active physical effects of the part."""
         return ("inertia",)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         r"""Return the time scale of inertia and its logarithm.
 
         See ``Part.parameter_values``. The time scale is :math:`T V_*/(2 \pi D_c)`.

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.parameter_layout import A
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 
 
-def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
+def build_quasi_static_slip_rate_functions(
+    friction_functions: FrictionFunctions,
+) -> tuple[NumericFunction, NumericFunction]:
     r"""Return the functions that compute the quasi-static slip rate.
 
     See ``Dynamics`` for the argument and for the returned functions.
@@ -25,13 +27,15 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         a \ln\frac{V}{V_*} = S(f) - \Psi, \quad a \, d\ln V = S'(f) \, df - d\Psi.
     """
     strength, state_sum = friction_functions.strength, friction_functions.state_sum
-    contribution = friction_functions.state_contribution
+    contribution = friction_functions.state_contribution_to_friction
 
-    def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+    def balance(
+        spring_stress: float, psis: FloatTuple, p: FloatTuple
+    ) -> tuple[float, float, float]:
         value, _slope, shift, _shift_slope = strength(spring_stress, psis, p)
         return (value - state_sum(psis)) / p[A], spring_stress, shift
 
-    def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
+    def growth(state: FloatTuple, rates: FloatTuple, x: float, g: float, p: FloatTuple) -> float:
         psis = state[1:]
         slope = strength(g, psis, p)[1]
         return (slope * rates[0] - contribution(rates[1:], g, psis, p)) / p[A]
@@ -46,4 +50,4 @@ class QuasiStatic(Dynamics):
     name = "quasi_static"
     regime = "quasi_static"
     allows_reversed_slip = True
-    build_slip_rate_functions = staticmethod(build_slip_rate_functions)
+    build_slip_rate_functions = staticmethod(build_quasi_static_slip_rate_functions)

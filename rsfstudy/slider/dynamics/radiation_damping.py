@@ -10,22 +10,22 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import FrictionFunctions
-from rsfstudy.slider.parameter_layout import DYNAMICS, LARGEST_LOG_SLIP_RATE, A
-from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
+from rsfstudy.slider.parameter_layout import DYNAMICS, LOG_SLIP_RATE_UPPER_LIMIT, A
+from rsfstudy.slider.parts import NON_NEGATIVE, FloatTuple, NumericFunction, number
 from rsfstudy.slider.scene_view import SceneView
 
-_MAX_ITERATIONS = 200
-_RTOL_OF_ROOT_ITERATION_STEPS = 1e-15
+_MAX_NEWTON_ITERATIONS = 200
+_NEWTON_STEP_RTOL = 1e-15
 #: Relative tolerance of the strength for the convergence of Newton's method. A small Newton step
 #: does not imply convergence, because the strength is very steep at the lower limit of normal
 #: stress. Only trial steps of the integrator reach the lower limit of normal stress.
-_STRESS_BALANCE_TOLERANCE = 1e-6
+_STRESS_BALANCE_RTOL = 1e-6
 #: Upper limit of ln V, at which the radiated stress is 10^300 eta. Only trial steps of the
 #: integrator reach the upper limit of ln V.
-_MAX_LOG_SLIP_RATE = 690.0
+_LOG_SLIP_RATE_UPPER_LIMIT = 690.0
 
 
-def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
+def compute_radiated_stress(log_slip_rate: float, damping_coefficient: float) -> float:
     r"""Compute the stress reduction due to the radiation of seismic waves.
 
     Parameters
@@ -45,10 +45,12 @@ def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
     ----------
     Rice (1993), J. Geophys. Res. 98, 9885-9907.
     """
-    return damping * math.expm1(log_slip_rate)
+    return damping_coefficient * math.expm1(log_slip_rate)
 
 
-def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
+def build_damped_slip_rate_functions(
+    friction_functions: FrictionFunctions,
+) -> tuple[NumericFunction, NumericFunction]:
     r"""Return the functions that compute the slip rate with radiation damping.
 
     See ``Dynamics`` for the argument and for the returned functions.
@@ -69,20 +71,25 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     interval.
     """
     strength, state_sum = friction_functions.strength, friction_functions.state_sum
-    contribution = friction_functions.state_contribution
+    contribution = friction_functions.state_contribution_to_friction
 
-    def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+    def balance(
+        spring_stress: float, psis: FloatTuple, p: FloatTuple
+    ) -> tuple[float, float, float]:
         a, damping, psi = p[A], p[DYNAMICS], state_sum(psis)
         # Slip is always forward, so the radiated stress is at least -eta. The lower bound of the
         # radiated stress limits ln V from above.
         low, high = (
             -math.inf,
-            min((strength(spring_stress + damping, psis, p)[0] - psi) / a, _MAX_LOG_SLIP_RATE),
+            min(
+                (strength(spring_stress + damping, psis, p)[0] - psi) / a,
+                _LOG_SLIP_RATE_UPPER_LIMIT,
+            ),
         )
         # This initial value is accurate if radiation balances most of the spring stress.
         x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
         before = math.inf
-        for _ in range(_MAX_ITERATIONS):
+        for _ in range(_MAX_NEWTON_ITERATIONS):
             g = spring_stress - damping * math.expm1(x)
             value, slope, shift, _shift_slope = strength(g, psis, p)
             missing = value - psi - a * x
@@ -91,14 +98,14 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
             else:
                 high = x
             change = missing / (a + slope * damping * math.exp(x))
-            balanced = abs(missing) <= _STRESS_BALANCE_TOLERANCE * (1.0 + abs(psi) + a * abs(x))
-            if balanced and abs(change) <= _RTOL_OF_ROOT_ITERATION_STEPS * (1.0 + abs(x)):
+            balanced = abs(missing) <= _STRESS_BALANCE_RTOL * (1.0 + abs(psi) + a * abs(x))
+            if balanced and abs(change) <= _NEWTON_STEP_RTOL * (1.0 + abs(x)):
                 return x, g, shift
             # If normal stress is almost zero, slopes are very steep, and Newton steps shrink
             # slowly.
-            slow = abs(change) > 0.5 * abs(before) or abs(
-                change
-            ) <= _RTOL_OF_ROOT_ITERATION_STEPS * (1.0 + abs(x))
+            slow = abs(change) > 0.5 * abs(before) or abs(change) <= _NEWTON_STEP_RTOL * (
+                1.0 + abs(x)
+            )
             before = change
             if slow or not low < x + change <= high:
                 before = math.inf
@@ -108,10 +115,10 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         g = spring_stress - damping * math.expm1(x)
         return x, g, strength(g, psis, p)[2]
 
-    def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
+    def growth(state: FloatTuple, rates: FloatTuple, x: float, g: float, p: FloatTuple) -> float:
         psis = state[1:]
         slope = strength(g, psis, p)[1]
-        resists = p[A] + slope * p[DYNAMICS] * math.exp(min(x, LARGEST_LOG_SLIP_RATE))
+        resists = p[A] + slope * p[DYNAMICS] * math.exp(min(x, LOG_SLIP_RATE_UPPER_LIMIT))
         return (slope * rates[0] - contribution(rates[1:], g, psis, p)) / resists
 
     return balance, growth
@@ -147,14 +154,14 @@ class RadiationDamping(Dynamics):
     name = "radiation_damping"
     selected_by = "radiation_damping"
     regime = "quasi_dynamic"
-    build_slip_rate_functions = staticmethod(build_slip_rate_functions)
+    build_slip_rate_functions = staticmethod(build_damped_slip_rate_functions)
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the active physical effects of the part."""
         return ("radiation_damping",)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the damping coefficient.
 
         See ``Part.parameter_values``.

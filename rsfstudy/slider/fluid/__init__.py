@@ -17,7 +17,7 @@ from rsfstudy.quantities import Quantity
 from rsfstudy.slider.needed_quantities import PORE_PRESSURE, SLIP_RATE
 from rsfstudy.slider.parts import (
     POSITIVE,
-    Numbers,
+    FloatTuple,
     Part,
     discover_parts,
     number,
@@ -66,7 +66,7 @@ class Fluid(Part):
         """Undrained pore pressure in sigma_* for a temperature rise of 1."""
         return 0.0
 
-    def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
+    def highest_pressure(self, log_slip_rate: float, states: FloatTuple) -> float:
         r"""Compute an upper bound on the future pore pressure.
 
         Parameters
@@ -159,4 +159,4 @@ def declare_drainage_field() -> Any:
     )
 
 
-BUILT_IN_PARTS = discover_parts(__name__, __path__)
+BUILT_IN_FLUID_CLASS_BY_NAME = discover_parts(__name__, __path__)

@@ -13,9 +13,9 @@ from rsfstudy.slider.parameter_layout import (
     BOUNDARY_PRESSURE_RATE,
     DYNAMICS,
     FLUID,
-    LARGEST_LOG_SLOWNESS,
+    LOG_SLOWNESS_UPPER_LIMIT,
 )
-from rsfstudy.slider.parts import Function, Numbers, collect_parameter_values
+from rsfstudy.slider.parts import FloatTuple, NumericFunction, collect_parameter_values
 from rsfstudy.slider.scene_view import SceneView
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @cache
-def add_boundary_pressure_rate(fluid_auxiliary_rates: Function) -> Function:
+def add_boundary_pressure_to_rates(fluid_auxiliary_rates: NumericFunction) -> NumericFunction:
     r"""Return a rate function that includes the pressure of the surroundings.
 
     Parameters
@@ -49,9 +49,9 @@ def add_boundary_pressure_rate(fluid_auxiliary_rates: Function) -> Function:
     """
 
     def auxiliary_rates(
-        log_slip_rate: float, states: Numbers, fraction: float, p: Numbers
-    ) -> Numbers:
-        time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+        log_slip_rate: float, states: FloatTuple, fraction: float, p: FloatTuple
+    ) -> FloatTuple:
+        time = fraction * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT))
         own = (*states[1:-1], states[-1] - states[0])
         return (
             -p[BOUNDARY_PRESSURE_RATE] * time,
@@ -62,7 +62,9 @@ def add_boundary_pressure_rate(fluid_auxiliary_rates: Function) -> Function:
 
 
 @cache
-def add_boundary_pressure_steady_state(fluid_auxiliary_steady_states: Function) -> Function:
+def add_boundary_pressure_to_steady_states(
+    fluid_auxiliary_steady_states: NumericFunction,
+) -> NumericFunction:
     """Return a steady-state function that includes the surrounding pressure.
 
     Parameters
@@ -78,7 +80,7 @@ def add_boundary_pressure_steady_state(fluid_auxiliary_steady_states: Function) 
         before the loading.
     """
 
-    def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
+    def auxiliary_steady_states(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
         return (0.0, *fluid_auxiliary_steady_states(log_slip_rate, p))
 
     return auxiliary_steady_states
@@ -96,7 +98,7 @@ class FluidWithBoundaryPressure:
         Fluid with unknowns, the last of which is the pore pressure in the fault.
     """
 
-    loading: Loading | Noise
+    boundary_pressure_loading: Loading | Noise
     fluid: Fluid
 
     @property
@@ -111,7 +113,7 @@ class FluidWithBoundaryPressure:
         The first unknown is the pressure of the surroundings, and the last unknown is the pore
         pressure in the fault.
         """
-        return (*self.loading.unknowns, *self.fluid.unknowns)
+        return (*self.boundary_pressure_loading.unknowns, *self.fluid.unknowns)
 
     @property
     def excluded_from_distance(self) -> tuple[str, ...]:
@@ -119,21 +121,24 @@ class FluidWithBoundaryPressure:
 
         The tuple includes the excluded unknowns of both the loading and the fluid.
         """
-        return (*self.loading.excluded_from_distance, *self.fluid.excluded_from_distance)
+        return (
+            *self.boundary_pressure_loading.excluded_from_distance,
+            *self.fluid.excluded_from_distance,
+        )
 
     @property
-    def auxiliary_rates(self) -> Function:
+    def auxiliary_rates(self) -> NumericFunction:
         """Function that computes the rates of all unknowns."""
         assert self.fluid.auxiliary_rates is not None
-        return add_boundary_pressure_rate(self.fluid.auxiliary_rates)
+        return add_boundary_pressure_to_rates(self.fluid.auxiliary_rates)
 
     @property
-    def auxiliary_steady_states(self) -> Function:
+    def auxiliary_steady_states(self) -> NumericFunction:
         """Function that returns all unknowns in steady sliding."""
         assert self.fluid.auxiliary_steady_states is not None
-        return add_boundary_pressure_steady_state(self.fluid.auxiliary_steady_states)
+        return add_boundary_pressure_to_steady_states(self.fluid.auxiliary_steady_states)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the parameters of the fluid and the rate of the loading.
 
         Parameters
@@ -149,4 +154,4 @@ class FluidWithBoundaryPressure:
         """
         own = collect_parameter_values(self.fluid, scene)
         between = (math.nan,) * (DYNAMICS - FLUID - 1 - len(own))
-        return (*own, *between, *collect_parameter_values(self.loading, scene))
+        return (*own, *between, *collect_parameter_values(self.boundary_pressure_loading, scene))

@@ -19,14 +19,14 @@ from rsfstudy.slider.fluid import (
     declare_porosity_length_field,
 )
 from rsfstudy.slider.laws import lacks_critical_stiffness
-from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parameter_layout import FLUID, LOG_SLOWNESS_UPPER_LIMIT
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 from rsfstudy.slider.scene_view import SceneView
 
 
-def porosity_and_pressure_rates(
-    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
-) -> Numbers:
+def compute_porosity_and_pressure_rates(
+    log_slip_rate: float, states: FloatTuple, slip_per_independent_variable: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the rates of porosity and pore pressure.
 
     The class ``Fluid`` describes the arguments. The states are the porosity
@@ -50,13 +50,13 @@ def porosity_and_pressure_rates(
     """
     porosity, pressure = states
     opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity)
-    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT))
     return opening, -p[FLUID + 1] * time * pressure - opening
 
 
-def rates_with_porosity_length(
-    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
-) -> Numbers:
+def compute_rates_with_porosity_length(
+    log_slip_rate: float, states: FloatTuple, slip_per_independent_variable: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the rates if porosity has a separate slip distance.
 
     Unlike ``porosity_and_pressure_rates``, the function uses the slip distance :math:`L_\varphi`
@@ -73,11 +73,11 @@ def rates_with_porosity_length(
     """
     porosity, pressure = states
     opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity) * p[FLUID + 2]
-    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT))
     return opening, -p[FLUID + 1] * time * pressure - opening
 
 
-def choose_porosity_rates(porosity_length: float) -> Function:
+def choose_porosity_rate_function(porosity_length: float) -> NumericFunction:
     """Return the function for the rates of porosity and pore pressure.
 
     Parameters
@@ -91,7 +91,11 @@ def choose_porosity_rates(porosity_length: float) -> Function:
         Function ``auxiliary_rates``. If the slip distance is :math:`D_c`, the function does not
         read the slip distance.
     """
-    return porosity_and_pressure_rates if porosity_length == 1.0 else rates_with_porosity_length
+    return (
+        compute_porosity_and_pressure_rates
+        if porosity_length == 1.0
+        else compute_rates_with_porosity_length
+    )
 
 
 def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
@@ -117,7 +121,7 @@ def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
     if getattr(fluid, "porosity_length", 1.0) == 1.0:
         return
     loading, remedy = scene.parts.loading, "Omit porosity_length."
-    if fluid.auxiliary_rates is not rates_with_porosity_length:
+    if fluid.auxiliary_rates is not compute_rates_with_porosity_length:
         rule = f"has no effect on the rates of the fluid {fluid.name!r}"
         raise fluid.field_error("porosity_length", rule, remedy)
     if loading.unknowns:
@@ -125,7 +129,7 @@ def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
         raise fluid.field_error("porosity_length", rule, remedy)
 
 
-def steady_porosity_and_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
+def compute_steady_porosity_and_pressure(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
     r"""Compute porosity and pore pressure in steady sliding.
 
     See ``Fluid`` for the arguments.
@@ -182,13 +186,16 @@ class DilatantFluid(Fluid):
         ),
         PORE_PRESSURE_QUANTITY,
     )
-    auxiliary_rates = staticmethod(porosity_and_pressure_rates)
-    auxiliary_steady_states = staticmethod(steady_porosity_and_pressure)
+    auxiliary_rates = staticmethod(compute_porosity_and_pressure_rates)
+    auxiliary_steady_states = staticmethod(compute_steady_porosity_and_pressure)
 
     def __post_init__(self) -> None:
         """Select the porosity rate function, unless a subclass defines its own."""
-        if self.porosity_length != 1.0 and self.auxiliary_rates is porosity_and_pressure_rates:
-            object.__setattr__(self, "auxiliary_rates", rates_with_porosity_length)
+        if (
+            self.porosity_length != 1.0
+            and self.auxiliary_rates is compute_porosity_and_pressure_rates
+        ):
+            object.__setattr__(self, "auxiliary_rates", compute_rates_with_porosity_length)
 
     def check(self, scene: SceneView) -> None:
         """Check the porosity length, and check that the stiffness ratio is defined.
@@ -202,7 +209,7 @@ class DilatantFluid(Fluid):
                 "drainage", rule, "Pass stiffness instead of stiffness_ratio, or increase drainage."
             )
 
-    def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
+    def highest_pressure(self, log_slip_rate: float, states: FloatTuple) -> float:
         r"""Compute an upper bound on the future pore pressure.
 
         See ``Fluid.highest_pressure``. The upper bound follows from the drainage rate and from the
@@ -214,7 +221,7 @@ class DilatantFluid(Fluid):
         closing = max(
             states[0] - self.dilatancy * log_slip_rate,
             self.dilatancy,
-            -self.dilatancy * (LARGEST_LOG_SLOWNESS + log_slip_rate),
+            -self.dilatancy * (LOG_SLOWNESS_UPPER_LIMIT + log_slip_rate),
         )
         closing_rate = math.exp(log_slip_rate) * closing / self.porosity_length
         return max(states[1], closing_rate / self.drainage)
@@ -224,13 +231,13 @@ class DilatantFluid(Fluid):
         """Names of the active physical effects of the part."""
         return ("dilatancy",)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the dilatancy and the drainage rate.
 
         See ``Part.parameter_values``. If the porosity length is not 1, its inverse is the third
         value.
         """
         plain = self.dilatancy, self.drainage
-        if self.auxiliary_rates is not rates_with_porosity_length:
+        if self.auxiliary_rates is not compute_rates_with_porosity_length:
             return plain
         return *plain, 1.0 / self.porosity_length

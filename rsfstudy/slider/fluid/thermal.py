@@ -21,16 +21,18 @@ from rsfstudy.slider.fluid import (
 from rsfstudy.slider.fluid.dilatant import (
     DilatantFluid,
     check_porosity_length,
-    choose_porosity_rates,
-    steady_porosity_and_pressure,
+    choose_porosity_rate_function,
+    compute_steady_porosity_and_pressure,
 )
 from rsfstudy.slider.laws import lacks_critical_stiffness
-from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
-from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
+from rsfstudy.slider.parameter_layout import FLUID, LOG_SLOWNESS_UPPER_LIMIT
+from rsfstudy.slider.parts import NON_NEGATIVE, FloatTuple, NumericFunction, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def pressure_rate(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
+def compute_drainage_pressure_rate(
+    log_slip_rate: float, states: FloatTuple, slip_per_independent_variable: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the rate of the pore pressure due to drainage.
 
     Parameters
@@ -50,11 +52,11 @@ def pressure_rate(log_slip_rate: float, states: Numbers, fraction: float, p: Num
     tuple of float
         Change in the pore pressure per unit slip in :math:`D_c`, multiplied by ``fraction``.
     """
-    time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT))
     return (-p[FLUID + 1] * time * states[0],)
 
 
-def steady_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
+def return_zero_steady_pore_pressure(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
     """Return the pore pressure of steady sliding, which is zero.
 
     Parameters
@@ -133,16 +135,24 @@ class ThermalFluid(Fluid):
         return DilatantFluid.unknowns if self.dilatancy else (PORE_PRESSURE_QUANTITY,)
 
     @property
-    def auxiliary_rates(self) -> Function:  # type: ignore[override]
+    def auxiliary_rates(self) -> NumericFunction:  # type: ignore[override]
         """Function that computes the rates of the unknowns without heating."""
-        return choose_porosity_rates(self.porosity_length) if self.dilatancy else pressure_rate
+        return (
+            choose_porosity_rate_function(self.porosity_length)
+            if self.dilatancy
+            else compute_drainage_pressure_rate
+        )
 
     @property
-    def auxiliary_steady_states(self) -> Function:  # type: ignore[override]
+    def auxiliary_steady_states(self) -> NumericFunction:  # type: ignore[override]
         """Function that returns the unknowns in steady sliding."""
-        return steady_porosity_and_pressure if self.dilatancy else steady_pressure
+        return (
+            compute_steady_porosity_and_pressure
+            if self.dilatancy
+            else return_zero_steady_pore_pressure
+        )
 
-    def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
+    def highest_pressure(self, log_slip_rate: float, states: FloatTuple) -> float:
         """Compute an upper bound on the future pore pressure without heating.
 
         See ``Fluid.highest_pressure``.
@@ -161,7 +171,7 @@ class ThermalFluid(Fluid):
         """Names of the active physical effects of the part."""
         return ("thermal_pressurisation", *("dilatancy",) * bool(self.dilatancy))
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the same parameters as for a dilatant fluid.
 
         See ``Part.parameter_values``. The pressurisation factor is stored with the parameters of

@@ -25,8 +25,8 @@ from rsfstudy.slider.needed_quantities import QUANTITIES_RECEIVED_BY_LAWS
 from rsfstudy.slider.parts import (
     NON_NEGATIVE,
     POSITIVE,
-    Function,
-    Numbers,
+    FloatTuple,
+    NumericFunction,
     Part,
     discover_parts,
     flag,
@@ -36,7 +36,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 #: Upper limit of exponents in evolution laws. A larger exponent occurs only in a trial step that
 #: the integrator rejects. Motions end before their slip rate falls below 10^-290 V_*.
-LARGEST_EVOLUTION_EXPONENT = 700.0
+MAX_EXPONENT_IN_STATE_EVOLUTION = 700.0
 
 
 def fast_expm1(exponent: float) -> float:
@@ -173,14 +173,14 @@ class LawBase(Part):
     #: constant slip rate. The argument ``rate`` is ln(V/V_*), and ``slip`` is the slip in D_c. The
     #: function returns the difference between the friction coefficient and its steady value,
     #: divided by b. If the function uses fields of the law, ``relaxation`` is a method.
-    relaxation: ClassVar[Function | None] = None
-    evolution: ClassVar[Function | None] = None
-    evolutions: ClassVar[Function | None] = None
-    steady_states: ClassVar[Function | None] = None
+    relaxation: ClassVar[NumericFunction | None] = None
+    evolution: ClassVar[NumericFunction | None] = None
+    evolutions: ClassVar[NumericFunction | None] = None
+    steady_states: ClassVar[NumericFunction | None] = None
     #: Function ``state_effect(friction, ratio, change, p) -> (shift, slope)``. The value ``shift``
     #: is the decrease in the state variable due to stress. The value ``slope`` is the derivative of
     #: ``shift`` with respect to frictional stress. Most laws do not define ``state_effect``.
-    state_effect: ClassVar[Function | None] = None
+    state_effect: ClassVar[NumericFunction | None] = None
 
     @classmethod
     def required_functions(cls) -> tuple[str, ...]:
@@ -202,7 +202,7 @@ class LawBase(Part):
         """
         raise TypeError(f"{type(self).__name__} does not define b_over_a")
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the parameters that precede the fields of the law in ``p``.
 
         The base class returns an empty tuple.
@@ -225,7 +225,7 @@ class LawBase(Part):
 
         The value is always positive.
         """
-        return abs(self.b_over_a) or B_OVER_A_STANDING_FOR_ZERO
+        return abs(self.b_over_a) or B_OVER_A_USED_INSTEAD_OF_ZERO
 
     @property
     def depends_on_stress(self) -> bool:
@@ -346,7 +346,7 @@ class Law(LawBase):
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the parameters of the law. The first parameter is b.
 
         If ``b_over_a`` is zero, the method returns a negligible positive value, because equations
@@ -362,7 +362,7 @@ class Law(LawBase):
         tuple of float
             Evolution effect parameter b.
         """
-        return (scene.a * (self.b_over_a or B_OVER_A_STANDING_FOR_ZERO),)
+        return (scene.a * (self.b_over_a or B_OVER_A_USED_INSTEAD_OF_ZERO),)
 
     @property
     def min_weakening_b_over_a(self) -> float:
@@ -400,10 +400,10 @@ class Law(LawBase):
         if not self.b_over_a and scene.parts.slider.initial_state:
             rule = "has no effect, because b_over_a is 0"
             raise scene.parts.slider.field_error("initial_state", rule, "Omit initial_state.")
-        if 0.0 < abs(self.b_over_a) < MIN_B_OVER_A:
+        if 0.0 < abs(self.b_over_a) < MIN_NONZERO_B_OVER_A:
             raise self.field_error(
                 "b_over_a",
-                f"must be 0 or have an absolute value of at least {MIN_B_OVER_A:g}",
+                f"must be 0 or have an absolute value of at least {MIN_NONZERO_B_OVER_A:g}",
                 "Pass 0.",
             )
         least = self.min_weakening_b_over_a
@@ -417,9 +417,9 @@ class Law(LawBase):
 
 #: Value of b/a that is used instead of zero, because equations divide by b. The value is so small
 #: that its effect is far smaller than rounding errors.
-B_OVER_A_STANDING_FOR_ZERO = 1e-60
+B_OVER_A_USED_INSTEAD_OF_ZERO = 1e-60
 #: Smallest nonzero b/a. Powers and quotients of smaller values would underflow or overflow.
-MIN_B_OVER_A = 1e-30
+MIN_NONZERO_B_OVER_A = 1e-30
 #: Advice to the user in error messages about a missing critical stiffness.
 MISSING_CRITICAL_STIFFNESS_REMEDY = (
     "Pass stiffness instead of stiffness_ratio, which is relative to the critical stiffness."
@@ -447,7 +447,7 @@ def lacks_critical_stiffness(scene: SceneView) -> bool:
     return not stated and not 0.0 < scene.critical_stiffness < math.inf
 
 
-BUILT_IN_PARTS = discover_parts(__name__, __path__)
+BUILT_IN_LAW_CLASS_BY_NAME = discover_parts(__name__, __path__)
 
 if not TYPE_CHECKING:
     __getattr__ = build_getattr_for_former_names(__name__)

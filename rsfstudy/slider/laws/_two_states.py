@@ -11,7 +11,7 @@ from rsfstudy.slider.laws import (
     lacks_critical_stiffness,
 )
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import POSITIVE, Numbers, number
+from rsfstudy.slider.parts import POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 #: Indices of the law parameters in ``p``. The parameters are b of each state, the share of each
@@ -19,7 +19,7 @@ from rsfstudy.slider.scene_view import SceneView
 FIRST_B, SECOND_B, FIRST_SHARE, SECOND_SHARE, LENGTH_QUOTIENT = range(LAW, LAW + 5)
 
 
-def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
+def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTuple) -> FloatTuple:
     r"""Compute both state variables in steady sliding.
 
     See ``LawBase`` for the arguments.
@@ -92,7 +92,7 @@ class TwoStateLaw(LawBase):
     )
 
     state_count = 2
-    steady_states = staticmethod(steady_states)
+    steady_states = staticmethod(compute_steady_states)
 
     @property
     def b_over_a(self) -> float:
@@ -104,7 +104,7 @@ class TwoStateLaw(LawBase):
         """Sum of the magnitudes of both evolution effects, divided by a."""
         return abs(self.b1_over_a) + abs(self.b2_over_a)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the parameters of both states and the length ratio.
 
         See ``Part.parameter_values``. The parameters of each state are its evolution effect

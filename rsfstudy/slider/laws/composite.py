@@ -9,16 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law, declare_cutoff_velocity_field
+from rsfstudy.slider.laws import MAX_EXPONENT_IN_STATE_EVOLUTION, Law, declare_cutoff_velocity_field
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView
 
 #: Number of Halley iterations. Four Halley iterations of ``lambert_w`` reach rounding accuracy.
-HALLEY_ITERATION_COUNT = 4
+LAMBERT_W_HALLEY_ITERATION_COUNT = 4
 
 
-def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
+def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: FloatTuple) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]``, followed by
@@ -52,11 +52,13 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
     b = p[LAW]
     ahead = state / b + log_slip_rate + p[LAW + 2]
     return b * (
-        healing_factor(log_slip_rate, p[LAW + 1]) * math.exp(clamp_exponent(-ahead)) - ahead
+        compute_healing_reduction_factor(log_slip_rate, p[LAW + 1])
+        * math.exp(clamp_exponent(-ahead))
+        - ahead
     )
 
 
-def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
+def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTuple) -> FloatTuple:
     r"""Compute the state variable in steady sliding.
 
     See ``LawBase`` for the arguments.
@@ -69,11 +71,11 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
 
         u \, e^u = e^{-V/V_c}.
     """
-    ahead = lambert_w(healing_factor(log_slip_rate, p[LAW + 1]))
+    ahead = compute_lambert_w(compute_healing_reduction_factor(log_slip_rate, p[LAW + 1]))
     return (state_shift + p[LAW] * (ahead - p[LAW + 2] - log_slip_rate),)
 
 
-def healing_factor(log_slip_rate: float, log_cutoff_velocity: float) -> float:
+def compute_healing_reduction_factor(log_slip_rate: float, log_cutoff_velocity: float) -> float:
     r"""Compute the factor that reduces healing at high slip rates.
 
     Parameters
@@ -106,10 +108,10 @@ def clamp_exponent(exponent: float) -> float:
     float
         Smaller of the exponent and the limit.
     """
-    return min(exponent, LARGEST_EVOLUTION_EXPONENT)
+    return min(exponent, MAX_EXPONENT_IN_STATE_EVOLUTION)
 
 
-def lambert_w(value: float) -> float:
+def compute_lambert_w(argument: float) -> float:
     """Compute the Lambert W function of a number between 0 and 1.
 
     Parameters
@@ -122,10 +124,10 @@ def lambert_w(value: float) -> float:
     float
         Solution w of ``w * exp(w) = value``, computed by Halley's method.
     """
-    w = value / (1.0 + value)
-    for _ in range(HALLEY_ITERATION_COUNT):
+    w = argument / (1.0 + argument)
+    for _ in range(LAMBERT_W_HALLEY_ITERATION_COUNT):
         grown = math.exp(w)
-        off = w * grown - value
+        off = w * grown - argument
         w -= off / (grown * (w + 1.0) - 0.5 * (w + 2.0) * off / (w + 1.0))
     return w
 
@@ -144,8 +146,8 @@ class CompositeLaw(Law):
     cutoff_velocity_ratio: float = declare_cutoff_velocity_field()
 
     name = "composite"
-    evolution = staticmethod(state_evolution_per_slip)
-    steady_states = staticmethod(steady_states)
+    evolution = staticmethod(compute_state_evolution_per_slip)
+    steady_states = staticmethod(compute_steady_states)
 
     @property
     def min_weakening_b_over_a(self) -> float:
@@ -154,10 +156,10 @@ class CompositeLaw(Law):
         At :math:`V_*`, the steady friction coefficient decreases with :math:`\ln V` at the rate
         :math:`b - a + b \, u_* V_*/[(1 + u_*) V_c]`.
         """
-        ahead = self._steady_state_offset_at_reference_rate()
+        ahead = self._compute_offset_at_reference_rate()
         return 1.0 / (1.0 + ahead / ((1.0 + ahead) * self.cutoff_velocity_ratio))
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return b, the logarithm of the cut-off velocity, and the steady offset.
 
         See ``Part.parameter_values``. The steady offset :math:`u_*` is the value of ln(theta V/D_c)
@@ -167,8 +169,10 @@ class CompositeLaw(Law):
         return (
             *super().parameter_values(scene),
             logarithm,
-            self._steady_state_offset_at_reference_rate(),
+            self._compute_offset_at_reference_rate(),
         )
 
-    def _steady_state_offset_at_reference_rate(self) -> float:
-        return lambert_w(healing_factor(0.0, math.log(self.cutoff_velocity_ratio)))
+    def _compute_offset_at_reference_rate(self) -> float:
+        return compute_lambert_w(
+            compute_healing_reduction_factor(0.0, math.log(self.cutoff_velocity_ratio))
+        )

@@ -10,17 +10,17 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.laws import (
-    LARGEST_EVOLUTION_EXPONENT,
+    MAX_EXPONENT_IN_STATE_EVOLUTION,
     Law,
     declare_cutoff_velocity_field,
     fast_expm1,
 )
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView
 
 
-def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
+def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: FloatTuple) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]``, followed by the
@@ -48,11 +48,11 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
     Okubo (1989), J. Geophys. Res. 94, 12321-12335.
     """
     b = p[LAW]
-    behind = steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]) - state / b
-    return b * fast_expm1(min(behind, LARGEST_EVOLUTION_EXPONENT))
+    behind = compute_steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]) - state / b
+    return b * fast_expm1(min(behind, MAX_EXPONENT_IN_STATE_EVOLUTION))
 
 
-def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
+def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTuple) -> FloatTuple:
     r"""Compute the state variable in steady sliding.
 
     See ``LawBase`` for the arguments.
@@ -65,10 +65,12 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
 
         \Theta_{\mathrm{ss}} = b \ln\frac{1 + V_c/V}{1 + V_c/V_*}.
     """
-    return (state_shift + p[LAW] * steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),)
+    return (
+        state_shift + p[LAW] * compute_steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),
+    )
 
 
-def steady_state_over_b(
+def compute_steady_state_over_b(
     log_slip_rate: float, cutoff_velocity_fraction: float, reference_velocity_fraction: float
 ) -> float:
     r"""Compute the state variable in steady sliding, divided by b.
@@ -94,11 +96,11 @@ def steady_state_over_b(
     Exponents are limited to ``LARGEST_EVOLUTION_EXPONENT`` to avoid overflow.
     """
     if log_slip_rate < 0.0:
-        exponent = min(-log_slip_rate, LARGEST_EVOLUTION_EXPONENT)
+        exponent = min(-log_slip_rate, MAX_EXPONENT_IN_STATE_EVOLUTION)
         return (
             math.log1p(cutoff_velocity_fraction * math.expm1(exponent)) - log_slip_rate - exponent
         )
-    exponent = min(log_slip_rate, LARGEST_EVOLUTION_EXPONENT)
+    exponent = min(log_slip_rate, MAX_EXPONENT_IN_STATE_EVOLUTION)
     return math.log1p(reference_velocity_fraction * math.expm1(exponent)) - exponent
 
 
@@ -116,8 +118,8 @@ class CutOffLaw(Law):
     cutoff_velocity_ratio: float = declare_cutoff_velocity_field()
 
     name = "cut_off"
-    evolution = staticmethod(state_evolution_per_slip)
-    steady_states = staticmethod(steady_states)
+    evolution = staticmethod(compute_state_evolution_per_slip)
+    steady_states = staticmethod(compute_steady_states)
     has_logarithmic_state = False  # The state is a logarithm of 1 + theta V_c/D_c.
 
     @property
@@ -129,13 +131,13 @@ class CutOffLaw(Law):
         """
         return 1.0 + 1.0 / self.cutoff_velocity_ratio
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return b and the two velocity fractions.
 
         See ``Part.parameter_values``. The velocity fractions are :math:`V_c/(V_c + V_*)` and
         :math:`V_*/(V_c + V_*)`.
         """
-        return (*super().parameter_values(scene), *self._cutoff_and_reference_velocity_fractions())
+        return (*super().parameter_values(scene), *self._compute_velocity_fractions())
 
     def relaxation(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.
@@ -160,12 +162,10 @@ class CutOffLaw(Law):
 
             \ln\left[1 + \left(\frac{1 + V_c/V_*}{1 + V_c/V} - 1\right) e^{-\delta/D_c}\right].
         """
-        ahead = -steady_state_over_b(
-            log_slip_rate, *self._cutoff_and_reference_velocity_fractions()
-        )
+        ahead = -compute_steady_state_over_b(log_slip_rate, *self._compute_velocity_fractions())
         return math.log(-math.expm1(-slip) + math.exp(ahead - slip))
 
-    def _cutoff_and_reference_velocity_fractions(self) -> Numbers:
+    def _compute_velocity_fractions(self) -> FloatTuple:
         return 1.0 / (1.0 + 1.0 / self.cutoff_velocity_ratio), 1.0 / (
             1.0 + self.cutoff_velocity_ratio
         )

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law, fast_expm1
+from rsfstudy.slider.laws import MAX_EXPONENT_IN_STATE_EVOLUTION, Law, fast_expm1
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.parts import FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
+def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: FloatTuple) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]`` and
@@ -39,7 +39,7 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
         return -(state + b * log_slip_rate)
     return (
         b
-        * fast_expm1(min(-exponent * (state / b + log_slip_rate), LARGEST_EVOLUTION_EXPONENT))
+        * fast_expm1(min(-exponent * (state / b + log_slip_rate), MAX_EXPONENT_IN_STATE_EVOLUTION))
         / exponent
     )
 
@@ -63,7 +63,7 @@ class SlipToSlownessLaw(Law):
     )
 
     name = "family"
-    evolution = staticmethod(state_evolution_per_slip)
+    evolution = staticmethod(compute_state_evolution_per_slip)
     scale_free = True
     has_closed_orbits = True  # The derivative dh/du = -(1 + eps h) is linear in h.
 
@@ -86,7 +86,7 @@ class SlipToSlownessLaw(Law):
             return log_slip_rate * math.exp(-slip)
         return math.log(-math.expm1(-slip) + math.exp(power - slip)) / self.law_exponent
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return b and the exponent of the law.
 
         See ``Part.parameter_values``.

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law
+from rsfstudy.slider.laws import MAX_EXPONENT_IN_STATE_EVOLUTION, Law
 from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A
-from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
+from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def steady_state(log_slip_rate: float, p: Numbers) -> float:
+def compute_unshifted_steady_state(log_slip_rate: float, p: FloatTuple) -> float:
     r"""Compute the state variable in steady sliding.
 
     Parameters
@@ -48,12 +48,12 @@ def steady_state(log_slip_rate: float, p: Numbers) -> float:
     b, exponent = p[LAW], p[LAW + 3]
     power = exponent * (log_slip_rate - p[LAW + 2])
     # For large arguments, ln(1 + exp(x)) equals x.
-    faster = power if power > LARGEST_EVOLUTION_EXPONENT else math.log1p(math.exp(power))
+    faster = power if power > MAX_EXPONENT_IN_STATE_EVOLUTION else math.log1p(math.exp(power))
     excess = p[MU_STAR] - p[LAW + 1] + (p[A] - b) * log_slip_rate
     return -b * log_slip_rate + excess * math.expm1((p[LAW + 4] - faster) / exponent)
 
 
-def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
+def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: FloatTuple) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
@@ -70,10 +70,10 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
     float
         Rate :math:`D_c \, d\Theta/d\delta = -(\Theta - \Theta_{\mathrm{ss}})`.
     """
-    return steady_state(log_slip_rate, p) - state
+    return compute_unshifted_steady_state(log_slip_rate, p) - state
 
 
-def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
+def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTuple) -> FloatTuple:
     r"""Compute the state variable in steady sliding, including the shift.
 
     Parameters
@@ -90,7 +90,7 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
     tuple of float
         State :math:`\Psi`.
     """
-    return (state_shift + steady_state(log_slip_rate, p),)
+    return (state_shift + compute_unshifted_steady_state(log_slip_rate, p),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,8 +155,8 @@ class FlashHeatingLaw(Law):
     )
 
     name = "flash_heating"
-    evolution = staticmethod(state_evolution_per_slip)
-    steady_states = staticmethod(steady_states)
+    evolution = staticmethod(compute_state_evolution_per_slip)
+    steady_states = staticmethod(compute_steady_states)
     has_logarithmic_state = False
 
     @property
@@ -179,7 +179,7 @@ class FlashHeatingLaw(Law):
                 "weakened_friction", rule, "Decrease weakened_friction, or increase mu_star."
             )
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         r"""Return b and the weakening parameters.
 
         See ``Part.parameter_values``. The weakening parameters are :math:`f_w`,
@@ -187,6 +187,8 @@ class FlashHeatingLaw(Law):
         """
         logarithm, exponent = math.log(self.weakening_velocity_ratio), self.weakening_exponent
         power = -exponent * logarithm
-        at_reference = power if power > LARGEST_EVOLUTION_EXPONENT else math.log1p(math.exp(power))
+        at_reference = (
+            power if power > MAX_EXPONENT_IN_STATE_EVOLUTION else math.log1p(math.exp(power))
+        )
         own = self.weakened_friction, logarithm, exponent, at_reference
         return (*super().parameter_values(scene), *own)

@@ -8,18 +8,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law
+from rsfstudy.slider.laws import MAX_EXPONENT_IN_STATE_EVOLUTION, Law
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 
 #: Upper limit of the difference between the state variable and its steady value, divided by b. A
 #: larger difference occurs only in a trial step of the integrator, because a motion ends at
 #: ln(V/V_*) = 276. The limit also prevents an overflow when the integrator squares the rate of the
 #: state variable to estimate the first step.
-MAX_STEADY_STATE_OFFSET_OVER_B = 300.0
+STEADY_STATE_OFFSET_OVER_B_UPPER_LIMIT = 300.0
 
 
-def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
+def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: FloatTuple) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]``.
@@ -46,13 +46,13 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
     b = p[LAW]
     return -b * math.sinh(
         max(
-            -LARGEST_EVOLUTION_EXPONENT,
-            min(state / b + log_slip_rate, MAX_STEADY_STATE_OFFSET_OVER_B),
+            -MAX_EXPONENT_IN_STATE_EVOLUTION,
+            min(state / b + log_slip_rate, STEADY_STATE_OFFSET_OVER_B_UPPER_LIMIT),
         )
     )
 
 
-def stress_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
+def compute_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     See ``LawBase.relaxation`` for the arguments.
@@ -78,6 +78,6 @@ class PerrinRiceZhengLaw(Law):
     """Evolution law of Perrin, Rice and Zheng."""
 
     name = "perrin_rice_zheng"
-    evolution = staticmethod(state_evolution_per_slip)
-    relaxation = staticmethod(stress_relaxation_after_velocity_step)
+    evolution = staticmethod(compute_state_evolution_per_slip)
+    relaxation = staticmethod(compute_relaxation_after_velocity_step)
     scale_free = True

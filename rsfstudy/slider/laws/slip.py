@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 
 
-def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
+def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: FloatTuple) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]``.
@@ -34,7 +34,7 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
     return -(state + p[LAW] * log_slip_rate)
 
 
-def stress_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
+def compute_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     See ``LawBase.relaxation`` for the arguments.
@@ -59,7 +59,7 @@ class SlipLaw(Law):
     """Slip law, in which the state variable evolves only with slip."""
 
     name = "slip"
-    evolution = staticmethod(state_evolution_per_slip)
-    relaxation = staticmethod(stress_relaxation_after_velocity_step)
+    evolution = staticmethod(compute_state_evolution_per_slip)
+    relaxation = staticmethod(compute_relaxation_after_velocity_step)
     scale_free = True
     has_closed_orbits = True  # See Gu et al. (1984).

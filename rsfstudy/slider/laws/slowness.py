@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law, fast_expm1
+from rsfstudy.slider.laws import MAX_EXPONENT_IN_STATE_EVOLUTION, Law, fast_expm1
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 
 
-def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
+def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: FloatTuple) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]``.
@@ -43,11 +43,11 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
     b = p[LAW]
     exponent = -(state / b + log_slip_rate)
     return b * fast_expm1(
-        LARGEST_EVOLUTION_EXPONENT if exponent > LARGEST_EVOLUTION_EXPONENT else exponent
+        MAX_EXPONENT_IN_STATE_EVOLUTION if exponent > MAX_EXPONENT_IN_STATE_EVOLUTION else exponent
     )
 
 
-def stress_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
+def compute_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     See ``LawBase.relaxation`` for the arguments.
@@ -72,7 +72,7 @@ class SlownessLaw(Law):
     """Slowness (ageing) law, in which contacts also heal at rest."""
 
     name = "slowness"
-    evolution = staticmethod(state_evolution_per_slip)
-    relaxation = staticmethod(stress_relaxation_after_velocity_step)
+    evolution = staticmethod(compute_state_evolution_per_slip)
+    relaxation = staticmethod(compute_relaxation_after_velocity_step)
     scale_free = True
     has_closed_orbits = True  # See Ranjith and Rice (1999).

@@ -12,16 +12,16 @@ from rsfstudy.slider.laws._two_states import (
     SECOND_SHARE,
     TwoStateLaw,
 )
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 
 
-def evolutions(
+def compute_state_evolutions(
     log_slip_rate: float,
-    states: Numbers,
+    states: FloatTuple,
     state_shift: float,
     slip_per_independent_variable: float,
-    p: Numbers,
-) -> Numbers:
+    p: FloatTuple,
+) -> FloatTuple:
     r"""Compute the evolution of both states at constant normal stress.
 
     See ``LawBase`` for the arguments.
@@ -49,4 +49,4 @@ class TwoStateSlipLaw(TwoStateLaw):
     """
 
     name = "two_slip_states"
-    evolutions = staticmethod(evolutions)
+    evolutions = staticmethod(compute_state_evolutions)

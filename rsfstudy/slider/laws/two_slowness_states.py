@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, fast_expm1
+from rsfstudy.slider.laws import MAX_EXPONENT_IN_STATE_EVOLUTION, fast_expm1
 from rsfstudy.slider.laws._two_states import (
     FIRST_B,
     FIRST_SHARE,
@@ -14,17 +14,17 @@ from rsfstudy.slider.laws._two_states import (
     SECOND_SHARE,
     TwoStateLaw,
 )
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView
 
 
-def evolutions(
+def compute_state_evolutions(
     log_slip_rate: float,
-    states: Numbers,
+    states: FloatTuple,
     state_shift: float,
     slip_per_independent_variable: float,
-    p: Numbers,
-) -> Numbers:
+    p: FloatTuple,
+) -> FloatTuple:
     r"""Compute the evolution of both states at constant normal stress.
 
     See ``LawBase`` for the arguments.
@@ -51,11 +51,11 @@ def evolutions(
     return (
         slip_per_independent_variable
         * p[FIRST_B]
-        * fast_expm1(min(-first, LARGEST_EVOLUTION_EXPONENT)),
+        * fast_expm1(min(-first, MAX_EXPONENT_IN_STATE_EVOLUTION)),
         slip_per_independent_variable
         * p[LENGTH_QUOTIENT]
         * p[SECOND_B]
-        * fast_expm1(min(-second, LARGEST_EVOLUTION_EXPONENT)),
+        * fast_expm1(min(-second, MAX_EXPONENT_IN_STATE_EVOLUTION)),
     )
 
 
@@ -67,7 +67,7 @@ class TwoStateSlownessLaw(TwoStateLaw):
     """
 
     name = "two_slowness_states"
-    evolutions = staticmethod(evolutions)
+    evolutions = staticmethod(compute_state_evolutions)
 
     def check(self, scene: SceneView) -> None:
         """Check that both states have an effect.

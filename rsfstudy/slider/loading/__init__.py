@@ -16,7 +16,7 @@ from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.needed_quantities import SLIP_RATE
-from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, discover_parts, number
+from rsfstudy.slider.parts import NON_NEGATIVE, FloatTuple, Part, discover_parts, number
 from rsfstudy.slider.scene_view import SceneView
 
 #: Minimum duration of a segment in D_c/V_*. The integrator cannot resolve shorter segments. At
@@ -121,7 +121,7 @@ class Loading(Part):
     #: a scene whose fluid has unknowns, the loading increases the pore pressure around the fault.
     of_pressure: ClassVar[bool] = True
 
-    def initial_unknowns(self, scene: SceneView) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> FloatTuple:
         """Return the initial values of the unknowns of the loading.
 
         Parameters
@@ -173,7 +173,7 @@ class Loading(Part):
                 raise wrong.with_location(f"segment {n + 1}")
 
     @property
-    def has_stress_unknowns(self) -> bool:
+    def adds_normal_stress_unknowns(self) -> bool:
         """True if the loading has unknowns that change normal stress."""
         return bool(self.unknowns) and not self.has_load_point_unknown
 
@@ -258,7 +258,9 @@ class Loading(Part):
     @property
     def changes_normal_stress(self) -> bool:
         """True if the loading changes normal stress."""
-        return self.has_stress_unknowns or any(segment.normal_stress for segment in self.segments)
+        return self.adds_normal_stress_unknowns or any(
+            segment.normal_stress for segment in self.segments
+        )
 
     @classmethod
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
@@ -276,7 +278,11 @@ class Loading(Part):
         InvalidValue
             Error whose message names the field that selects the other loading.
         """
-        owners = (p for p in BUILT_IN_PARTS.values() if str(name) in p.__dataclass_fields__)
+        owners = (
+            p
+            for p in BUILT_IN_LOADING_CLASS_BY_NAME.values()
+            if str(name) in p.__dataclass_fields__
+        )
         wanted = " or ".join(p.selected_by for p in owners if p.selected_by not in ("", name))
         remedy = f"Omit {name}, or also set {wanted}." if wanted else f"Omit {name}."
         # The name of a protocol is an attribute of the instance, not of the class.
@@ -325,4 +331,4 @@ class LoadingWithFinalLoadVelocity(Loading):
         return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
 
 
-BUILT_IN_PARTS = discover_parts(__name__, __path__)
+BUILT_IN_LOADING_CLASS_BY_NAME = discover_parts(__name__, __path__)

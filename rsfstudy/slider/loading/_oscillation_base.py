@@ -15,14 +15,14 @@ from rsfstudy.slider.loading import (
     Segment,
     declare_load_velocity_field,
 )
-from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLOWNESS, LOADING
-from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
+from rsfstudy.slider.parameter_layout import LOADING, LOG_SLOWNESS_UPPER_LIMIT
+from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def harmonic_oscillation_rates(
-    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
-) -> Numbers:
+def compute_harmonic_oscillation_rates(
+    log_slip_rate: float, states: FloatTuple, slip_per_independent_variable: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the rates of the two unknowns of a harmonic oscillation.
 
     See ``Fluid`` for the arguments. The states are the unknowns :math:`y` and :math:`P`. The
@@ -47,14 +47,14 @@ def harmonic_oscillation_rates(
     turn = (
         p[LOADING]
         * slip_per_independent_variable
-        * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+        * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT))
     )
     over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
     missing = 0.5 * (1.0 - over * over - relative * relative)
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
 
 
-def zero_oscillation_in_steady_sliding(log_slip_rate: float, p: Numbers) -> Numbers:
+def return_zero_steady_oscillation(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
     r"""Return the unknowns of the oscillation in steady sliding.
 
     Steady sliding has no oscillation, so both unknowns are zero.
@@ -117,8 +117,8 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
     )
 
     of_pressure = False
-    auxiliary_rates = staticmethod(harmonic_oscillation_rates)
-    auxiliary_steady_states = staticmethod(zero_oscillation_in_steady_sliding)
+    auxiliary_rates = staticmethod(compute_harmonic_oscillation_rates)
+    auxiliary_steady_states = staticmethod(return_zero_steady_oscillation)
 
     def check(self, scene: SceneView) -> None:
         """Check that the scene has inertia if the oscillation is fast.

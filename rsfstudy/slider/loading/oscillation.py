@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.loading import _oscillation_base
-from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, number
+from rsfstudy.slider.parts import NON_NEGATIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -76,7 +76,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
             raise self.field_error("oscillation_amplitude", "must be less than 1", remedy)
         super().check(scene)
 
-    def initial_unknowns(self, scene: SceneView) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> FloatTuple:
         """Return the values of the unknowns y and P at the initial phase.
 
         See ``Loading.initial_unknowns``.
@@ -84,7 +84,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
         amplitude, angle = self.oscillation_amplitude, self.initial_phase
         return amplitude * math.cos(angle), -amplitude * math.sin(angle)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the angular frequency and the amplitude.
 
         See ``Part.parameter_values``.

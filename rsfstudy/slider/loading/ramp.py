@@ -14,14 +14,14 @@ from rsfstudy.slider.loading import (
     Segment,
     declare_load_velocity_field,
 )
-from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLOWNESS, LOADING
-from rsfstudy.slider.parts import POSITIVE, Numbers, number
+from rsfstudy.slider.parameter_layout import LOADING, LOG_SLOWNESS_UPPER_LIMIT
+from rsfstudy.slider.parts import POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def pending_normal_stress_rates(
-    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
-) -> Numbers:
+def compute_remaining_normal_stress_rates(
+    log_slip_rate: float, states: FloatTuple, slip_per_independent_variable: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the rate of the remaining normal stress change of a ramp.
 
     See ``Fluid`` for the arguments. The only state is :math:`P`, the remaining change in normal
@@ -39,11 +39,11 @@ def pending_normal_stress_rates(
     return (
         -p[LOADING]
         * slip_per_independent_variable
-        * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS)),
+        * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT)),
     )
 
 
-def zero_pending_normal_stress(log_slip_rate: float, p: Numbers) -> Numbers:
+def return_zero_remaining_normal_stress(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
     r"""Return the remaining normal stress change in steady sliding.
 
     The remaining change is zero, because normal stress is constant in steady sliding.
@@ -102,8 +102,8 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
         Quantity("ramp_left", "$P$", "1", "remaining change of imposed normal stress", "sigma_*"),
     )
     of_pressure = False
-    auxiliary_rates = staticmethod(pending_normal_stress_rates)
-    auxiliary_steady_states = staticmethod(zero_pending_normal_stress)
+    auxiliary_rates = staticmethod(compute_remaining_normal_stress_rates)
+    auxiliary_steady_states = staticmethod(return_zero_remaining_normal_stress)
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -111,14 +111,14 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
         last = Segment(self.load_velocity, normal_stress=self.normal_stress_ramp)
         return last._replace(duration=self.ramp_duration), last
 
-    def initial_unknowns(self, scene: SceneView) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> FloatTuple:
         """Return the total change in normal stress.
 
         See ``Loading.initial_unknowns``.
         """
         return (self.normal_stress_ramp,)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the rate of imposed normal stress.
 
         See ``Part.parameter_values``.

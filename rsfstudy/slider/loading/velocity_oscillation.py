@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.loading import _oscillation_base
-from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, number
+from rsfstudy.slider.parts import NON_NEGATIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -85,15 +85,15 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
             raise self.field_error("load_velocity_ratio", rule)
         super().check(scene)
 
-    def initial_unknowns(self, scene: SceneView) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> FloatTuple:
         r"""Return the values of the unknowns at the initial phase.
 
         See ``Loading.initial_unknowns``. The last unknown is :math:`-K R \cos(\omega t + \phi_o)`.
         """
-        stress = self.stress_amplitude(scene)
+        stress = self.compute_shear_stress_amplitude(scene)
         return -stress * math.sin(self.initial_phase), -stress * math.cos(self.initial_phase)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the parameters of the oscillation.
 
         The parameters are the angular frequency, the stress amplitude and the initial value of the
@@ -101,9 +101,13 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
 
         See ``Part.parameter_values``.
         """
-        return self.angular_frequency, self.stress_amplitude(scene), self.initial_unknowns(scene)[1]
+        return (
+            self.angular_frequency,
+            self.compute_shear_stress_amplitude(scene),
+            self.initial_unknowns(scene)[1],
+        )
 
-    def stress_amplitude(self, scene: SceneView) -> float:
+    def compute_shear_stress_amplitude(self, scene: SceneView) -> float:
         r"""Compute the amplitude of the imposed shear stress.
 
         Parameters

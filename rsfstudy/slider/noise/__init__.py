@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.loading import ramp
-from rsfstudy.slider.parts import Numbers, Part, discover_parts
+from rsfstudy.slider.parts import FloatTuple, Part, discover_parts
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -42,8 +42,8 @@ class Noise(Part):
     is_active: ClassVar[bool] = False
     has_load_point_unknown: ClassVar[bool] = False
     of_pressure: ClassVar[bool] = False
-    auxiliary_rates = staticmethod(ramp.pending_normal_stress_rates)
-    auxiliary_steady_states = staticmethod(ramp.zero_pending_normal_stress)
+    auxiliary_rates = staticmethod(ramp.compute_remaining_normal_stress_rates)
+    auxiliary_steady_states = staticmethod(ramp.return_zero_remaining_normal_stress)
 
     @property
     def changes_normal_stress(self) -> bool:
@@ -57,14 +57,14 @@ class Noise(Part):
         If the noise changes normal stress, the decrease in normal stress is an unknown. Noise of
         shear stress does not need an unknown, because it changes the rate of the spring stress.
         """
-        return _NORMAL_STRESS_UNKNOWNS if self.changes_normal_stress else ()
+        return _UNKNOWNS_OF_NORMAL_STRESS_NOISE if self.changes_normal_stress else ()
 
     @property
-    def has_stress_unknowns(self) -> bool:
+    def adds_normal_stress_unknowns(self) -> bool:
         """True if the noise has unknowns that change normal stress."""
         return bool(self.unknowns)
 
-    def initial_unknowns(self, scene: SceneView) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> FloatTuple:
         """Return the decrease in normal stress at the start of the path, which is zero.
 
         Parameters
@@ -79,7 +79,9 @@ class Noise(Part):
         """
         return (0.0,) * len(self.unknowns)
 
-    def iterate_segments(self, start: float, end: float, velocity: float) -> Iterator[Any]:
+    def iterate_segment_table_blocks(
+        self, start_time: float, end_time: float, load_velocity: float
+    ) -> Iterator[Any]:
         """Yield the segment table of the noise in blocks.
 
         Parameters
@@ -102,9 +104,9 @@ class Noise(Part):
         raise TypeError(f"{self.name} has no path")
 
 
-_NORMAL_STRESS_UNKNOWNS = (
+_UNKNOWNS_OF_NORMAL_STRESS_NOISE = (
     Quantity("noise_fall", "$P$", "1", "fall of normal stress by noise", "sigma_*"),
 )
 
 
-BUILT_IN_PARTS = discover_parts(__name__, __path__)
+BUILT_IN_NOISE_CLASS_BY_NAME = discover_parts(__name__, __path__)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rsfstudy.slider import noise_paths
 from rsfstudy.slider.noise.white import WhiteNoise
-from rsfstudy.slider.parts import POSITIVE, Numbers, number
+from rsfstudy.slider.parts import POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -46,16 +46,18 @@ class CorrelatedNoise(WhiteNoise):
 
     name = "correlated"
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the initial rate of change of the normal stress.
 
         See ``WhiteNoise.parameter_values``.
         """
         return super().parameter_values(scene)
 
-    def path(self, stream: int) -> noise_paths.Path:
+    def build_unit_noise_path(self, stream_number: int) -> noise_paths.UnitNoisePath:
         """Return the path of unit noise.
 
         See ``WhiteNoise.path``.
         """
-        return noise_paths.Path(int(self.noise_seed), stream, self.noise_correlation_time)
+        return noise_paths.UnitNoisePath(
+            int(self.noise_seed), stream_number, self.noise_correlation_time
+        )

@@ -13,7 +13,7 @@ from rsfstudy.slider.parts import (
     NON_NEGATIVE,
     NON_NEGATIVE_INTEGER,
     POSITIVE,
-    Numbers,
+    FloatTuple,
     number,
 )
 from rsfstudy.slider.scene_view import SceneView
@@ -123,14 +123,14 @@ class WhiteNoise(Noise):
             rule += ", because the pore pressure already changes the effective normal stress"
             raise self.field_error("normal_stress_noise", rule, "Omit one of the two.")
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the initial rate of change of the normal stress.
 
         See ``Part.parameter_values``. The event loop replaces the value at each sample.
         """
         return (0.0,) * len(self.unknowns)
 
-    def path(self, stream: int) -> noise_paths.Path:
+    def build_unit_noise_path(self, stream_number: int) -> noise_paths.UnitNoisePath:
         """Return the path of unit noise.
 
         Parameters
@@ -143,15 +143,19 @@ class WhiteNoise(Noise):
         Path
             Path whose samples are multiplied by the amplitude.
         """
-        return noise_paths.Path(int(self.noise_seed), stream)
+        return noise_paths.UnitNoisePath(int(self.noise_seed), stream_number)
 
-    def iterate_segments(self, start: float, end: float, velocity: float) -> Iterator[Any]:
+    def iterate_segment_table_blocks(
+        self, start_time: float, end_time: float, load_velocity: float
+    ) -> Iterator[Any]:
         """Yield the segment table of the noise in blocks.
 
         See ``Noise.iterate_segments``.
         """
-        shear = self.path(0), self.stress_noise
-        normal = (self.path(1), self.normal_stress_noise) if self.unknowns else None
-        return noise_paths.iterate_segments(
-            start, end, velocity, self.noise_interval, shear, normal
+        shear = self.build_unit_noise_path(0), self.stress_noise
+        normal = (
+            (self.build_unit_noise_path(1), self.normal_stress_noise) if self.unknowns else None
+        )
+        return noise_paths.iterate_segment_table_blocks(
+            start_time, end_time, load_velocity, self.noise_interval, shear, normal
         )

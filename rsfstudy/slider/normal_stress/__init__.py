@@ -13,7 +13,7 @@ from typing import ClassVar
 
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.needed_quantities import SHEAR_STRESS
-from rsfstudy.slider.parts import Function, Part, discover_parts
+from rsfstudy.slider.parts import NumericFunction, Part, discover_parts
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -40,10 +40,10 @@ class NormalStress(Part):
     derived_properties = ("depends_on_shear_stress", "coupling", "min_frictional_stress")
     defining_methods = frozenset({"normal_stress", "state_effect", "parameter_values"})
     received_quantities = frozenset({SHEAR_STRESS})
-    normal_stress: ClassVar[Function | None] = None
+    normal_stress: ClassVar[NumericFunction | None] = None
 
     @property
-    def state_effect(self) -> Function | None:
+    def state_effect(self) -> NumericFunction | None:
         """Effect of normal stress on the state variable.
 
         The property is None if normal stress has no effect on the state. If normal stress affects
@@ -85,4 +85,4 @@ class NormalStress(Part):
         return -math.inf
 
 
-BUILT_IN_PARTS = discover_parts(__name__, __path__)
+BUILT_IN_NORMAL_STRESS_CLASS_BY_NAME = discover_parts(__name__, __path__)

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.slider.parameter_layout import NORMAL_STRESS
-from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
+from rsfstudy.slider.parts import NON_NEGATIVE, FloatTuple, NumericFunction, number
 
 
-def linker_dieterich_effect(
+def compute_linker_dieterich_state_decrease(
     frictional_stress: float,
     normal_stress_ratio: float,
     normal_stress_derivative: float,
-    p: Numbers,
+    p: FloatTuple,
 ) -> tuple[float, float]:
     r"""Compute the decrease in the state variable due to normal stress.
 
@@ -60,12 +60,12 @@ class NormalStressWithStateEffect(NormalStress):
     )
 
     @property
-    def state_effect(self) -> Function | None:
+    def state_effect(self) -> NumericFunction | None:
         """Effect of normal stress on the state variable.
 
         The property is None if ``alpha`` is zero.
         """
-        return linker_dieterich_effect if self.alpha else None
+        return compute_linker_dieterich_state_decrease if self.alpha else None
 
     @property
     def effects(self) -> tuple[str, ...]:

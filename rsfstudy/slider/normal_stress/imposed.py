@@ -9,11 +9,13 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress._state_effect import NormalStressWithStateEffect
 from rsfstudy.slider.parameter_layout import IMPOSED_NORMAL_STRESS
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView
 
 
-def imposed_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
+def compute_imposed_normal_stress_excess(
+    frictional_stress: float, p: FloatTuple
+) -> tuple[float, float]:
     r"""Compute the imposed normal stress.
 
     See ``NormalStress`` for the arguments. The function reads the imposed change in normal stress
@@ -46,7 +48,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
         "when normal stress does not depend on shear stress",
         "set normal_stress='variable'",
     )
-    normal_stress = staticmethod(imposed_normal_stress_excess)
+    normal_stress = staticmethod(compute_imposed_normal_stress_excess)
     depends_on_shear_stress = False
 
     @property
@@ -58,7 +60,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
         """
         return 0.0, self.alpha
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the coefficient of the effect on the state.
 
         See ``Part.parameter_values``.

@@ -16,11 +16,13 @@ from rsfstudy.slider.parameter_layout import (
     NORMAL_STRESS,
     SMALLEST_NORMAL_STRESS_EXCESS,
 )
-from rsfstudy.slider.parts import POSITIVE, Numbers, number
+from rsfstudy.slider.parts import POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def shear_coupled_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
+def compute_coupled_normal_stress_excess(
+    frictional_stress: float, p: FloatTuple
+) -> tuple[float, float]:
     r"""Compute the normal stress under an inclined driving stress.
 
     See ``NormalStress`` for the arguments. The function reads :math:`\cot\phi` from
@@ -83,7 +85,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
     )
 
     name = "variable"
-    normal_stress = staticmethod(shear_coupled_normal_stress_excess)
+    normal_stress = staticmethod(compute_coupled_normal_stress_excess)
 
     @property
     def cot_phi(self) -> float:
@@ -103,7 +105,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
         """Names of the active physical effects of the part."""
         return ("inclined_driving", *super().effects)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the coefficient alpha and the cotangent of phi.
 
         See ``Part.parameter_values``.

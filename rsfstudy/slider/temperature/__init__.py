@@ -27,7 +27,7 @@ from rsfstudy.slider.needed_quantities import (
     SHEAR_STRESS,
     SLIP_RATE,
 )
-from rsfstudy.slider.parts import Function, Part, discover_parts
+from rsfstudy.slider.parts import NumericFunction, Part, discover_parts
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -64,7 +64,7 @@ class Temperature(Part):
     received_quantities = frozenset(
         {SLIP_RATE, FRICTION_COEFFICIENT, EFFECTIVE_NORMAL_STRESS, SHEAR_STRESS}
     )
-    temperature_rate: ClassVar[Function | None] = None
+    temperature_rate: ClassVar[NumericFunction | None] = None
 
     @classmethod
     def required_functions(cls) -> tuple[str, ...]:
@@ -106,4 +106,4 @@ class Temperature(Part):
         return -math.inf, math.inf
 
 
-BUILT_IN_PARTS = discover_parts(__name__, __path__)
+BUILT_IN_TEMPERATURE_CLASS_BY_NAME = discover_parts(__name__, __path__)

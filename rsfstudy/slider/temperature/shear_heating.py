@@ -11,19 +11,19 @@ from dataclasses import dataclass
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.laws import lacks_critical_stiffness
 from rsfstudy.slider.needed_quantities import EFFECTIVE_NORMAL_STRESS, FRICTION_COEFFICIENT
-from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLOWNESS
-from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
+from rsfstudy.slider.parameter_layout import LOG_SLOWNESS_UPPER_LIMIT
+from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.temperature import Temperature
 
 
-def temperature_rate(
+def compute_temperature_rate(
     log_slip_rate: float,
-    rise: float,
-    friction: float,
+    temperature_rise: float,
+    friction_coefficient: float,
     normal_stress: float,
-    fraction: float,
-    parameters: Numbers,
+    slip_per_independent_variable: float,
+    heating_parameters: FloatTuple,
 ) -> float:
     r"""Compute the rate of the temperature rise.
 
@@ -55,9 +55,11 @@ def temperature_rate(
 
         \frac{d\vartheta}{dt} = H (\mu s V - \mu_*) - C \vartheta.
     """
-    heating, cooling, steady_heating = parameters
-    time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
-    return fraction * heating * friction * normal_stress - time * (steady_heating + cooling * rise)
+    heating, cooling, steady_heating = heating_parameters
+    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT))
+    return slip_per_independent_variable * heating * friction_coefficient * normal_stress - time * (
+        steady_heating + cooling * temperature_rise
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +141,7 @@ class ShearHeating(Temperature):
         ),
     )
     needs = frozenset({FRICTION_COEFFICIENT, EFFECTIVE_NORMAL_STRESS})
-    temperature_rate = staticmethod(temperature_rate)
+    temperature_rate = staticmethod(compute_temperature_rate)
 
     @property
     def activation(self) -> tuple[float, float]:
@@ -151,7 +153,7 @@ class ShearHeating(Temperature):
         """Names of the active physical effects of the part."""
         return ("shear_heating", *("thermal_activation",) * any(self.activation))
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> FloatTuple:
         r"""Return the parameters of ``temperature_rate``.
 
         See ``Part.parameter_values``.

@@ -15,17 +15,17 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 #: Minimum number of samples of a curve.
-MIN_SAMPLES_OF_CURVE = 4
+MIN_SAMPLES_FOR_CROSSING_SEARCH = 4
 #: Number of intervals that are examined on each side of the interval with the crossing.
-_EXAMINED_INTERVALS_BESIDE_BRACKET = 3
+_INTERVALS_EXAMINED_BESIDE_CROSSING = 3
 #: Changes in slope below this fraction of the largest slope are regarded as rounding errors.
-_MAX_ROUNDING_ERROR_OF_SLOPE_CHANGES = 1e-9
+_MIN_SLOPE_CHANGE_OVER_MAX_SLOPE = 1e-9
 #: Smallest change in slope that indicates an oscillation, relative to the largest change in slope
 #: and to the smallest slope of the neighbouring intervals.
 _MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE = 0.1
 
 
-class CrossingStatus(IntEnum):
+class CrossingSearchStatus(IntEnum):
     """Outcome of the search for a level crossing.
 
     The integer values are stored in results files, so they must not be changed.
@@ -34,7 +34,7 @@ class CrossingStatus(IntEnum):
     OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW_POINTS = range(5)
 
 
-class Crossing(NamedTuple):
+class LevelCrossing(NamedTuple):
     """Position of a level crossing, its bounds, and the status of the search.
 
     Parameters
@@ -50,10 +50,10 @@ class Crossing(NamedTuple):
     position: float
     lower_bound: float
     upper_bound: float
-    status: CrossingStatus
+    status: CrossingSearchStatus
 
 
-def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
+def find_unique_crossing(x: np.ndarray, y: np.ndarray, level: float) -> LevelCrossing:
     r"""Find the position at which a sampled curve reaches a level.
 
     Parameters
@@ -89,36 +89,36 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
     is doubled and used for all intervals. If the changes in slope alternate in sign, the samples
     may hide an oscillation, and the bounds enclose at least the whole interval.
     """
-    if x.size < MIN_SAMPLES_OF_CURVE:
-        return _build_result_without_crossing(CrossingStatus.TOO_FEW_POINTS)
+    if x.size < MIN_SAMPLES_FOR_CROSSING_SEARCH:
+        return _build_result_without_crossing(CrossingSearchStatus.TOO_FEW_POINTS)
     places = find_all_crossings(x, y, level)
     if len(places) != 1:
         return _build_result_without_crossing(
-            CrossingStatus.NOT_UNIQUE if places else CrossingStatus.OUT_OF_REACH
+            CrossingSearchStatus.NOT_UNIQUE if places else CrossingSearchStatus.OUT_OF_REACH
         )
     place, widths = places[0], np.diff(x)
     slopes = np.diff(y) / widths
     bracket = int(np.clip(np.searchsorted(x, place) - 1, 0, slopes.size - 1))
     near = range(
-        max(bracket - _EXAMINED_INTERVALS_BESIDE_BRACKET, 0),
-        min(bracket + _EXAMINED_INTERVALS_BESIDE_BRACKET + 1, slopes.size),
+        max(bracket - _INTERVALS_EXAMINED_BESIDE_CROSSING, 0),
+        min(bracket + _INTERVALS_EXAMINED_BESIDE_CROSSING + 1, slopes.size),
     )
     turns, alternates = _estimate_slope_changes(slopes, near)
     bounds, far = [place], False
     for n in near if alternates else (bracket,):
-        span = _crossing_bounds(slopes[n], turns[n], widths[n], level - y[n])
+        span = _compute_crossing_bounds(slopes[n], turns[n], widths[n], level - y[n])
         if span:
             bounds += [x[n] + end for end in span]
-            far |= abs(n - bracket) >= _EXAMINED_INTERVALS_BESIDE_BRACKET
+            far |= abs(n - bracket) >= _INTERVALS_EXAMINED_BESIDE_CROSSING
     if alternates:
         bounds += [x[bracket], x[bracket + 1]]
     if bracket in (0, slopes.size - 1):
-        span = _crossing_bounds_at_end(
+        span = _compute_crossing_bounds_at_curve_end(
             slopes, widths, level - y[bracket], is_first_interval=bracket == 0
         )
         bounds += [x[bracket] + end for end in span]
-    verdict = CrossingStatus.UNRESOLVED if far else CrossingStatus.OK
-    return Crossing(place, float(min(bounds)), float(max(bounds)), verdict)
+    verdict = CrossingSearchStatus.UNRESOLVED if far else CrossingSearchStatus.OK
+    return LevelCrossing(place, float(min(bounds)), float(max(bounds)), verdict)
 
 
 def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
@@ -147,9 +147,9 @@ def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float
     return places
 
 
-def _build_result_without_crossing(crossing_status: CrossingStatus) -> Crossing:
+def _build_result_without_crossing(crossing_status: CrossingSearchStatus) -> LevelCrossing:
     """Return a ``Crossing`` that has a status but no position."""
-    return Crossing(math.nan, math.nan, math.nan, crossing_status)
+    return LevelCrossing(math.nan, math.nan, math.nan, crossing_status)
 
 
 def _estimate_slope_changes(
@@ -179,7 +179,7 @@ def _estimate_slope_changes(
         turns[n] = 2.0 * float(beside.mean())  # At an end, only one change is known.
     within = bends[interval_numbers.start : interval_numbers.stop - 1]
     if not _count_sign_reversals(
-        within, _MAX_ROUNDING_ERROR_OF_SLOPE_CHANGES * float(np.abs(slopes).max())
+        within, _MIN_SLOPE_CHANGE_OVER_MAX_SLOPE * float(np.abs(slopes).max())
     ):
         return turns, False
     largest = 2.0 * max(turns.values())
@@ -199,8 +199,8 @@ def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) ->
     return int((counted[1:] * counted[:-1] < 0.0).sum())
 
 
-def _crossing_bounds(
-    slope: float, slope_change: float, interval_width: float, level_minus_first_value: float
+def _compute_crossing_bounds(
+    slope: float, total_slope_change: float, interval_width: float, level_minus_first_value: float
 ) -> tuple[float, float] | None:
     """Return the bounds of a crossing in an interval.
 
@@ -213,8 +213,11 @@ def _crossing_bounds(
     if (
         level_minus_first_value > slope * interval_width
     ):  # The curve is mirrored, so that the level is below the first sample.
-        mirrored = _crossing_bounds(
-            slope, slope_change, interval_width, slope * interval_width - level_minus_first_value
+        mirrored = _compute_crossing_bounds(
+            slope,
+            total_slope_change,
+            interval_width,
+            slope * interval_width - level_minus_first_value,
         )
         return (
             None
@@ -222,30 +225,32 @@ def _crossing_bounds(
             else (interval_width - mirrored[1], interval_width - mirrored[0])
         )
     if level_minus_first_value < 0.0:
-        excess = slope_change - slope
-        root = excess**2 + 4.0 * slope_change / interval_width * level_minus_first_value
+        excess = total_slope_change - slope
+        root = excess**2 + 4.0 * total_slope_change / interval_width * level_minus_first_value
         if excess <= 0.0 or root < 0.0:
             return None
         middle, half = (
-            0.5 * interval_width * excess / slope_change,
-            0.5 * interval_width * math.sqrt(root) / slope_change,
+            0.5 * interval_width * excess / total_slope_change,
+            0.5 * interval_width * math.sqrt(root) / total_slope_change,
         )
         return middle - half, middle + half
-    rises, falls = slope + slope_change, slope - slope_change
+    rises, falls = slope + total_slope_change, slope - total_slope_change
     steeper = math.sqrt(
-        max(rises**2 - 4.0 * slope_change / interval_width * level_minus_first_value, 0.0)
+        max(rises**2 - 4.0 * total_slope_change / interval_width * level_minus_first_value, 0.0)
     )
-    flatter = math.sqrt(falls**2 + 4.0 * slope_change / interval_width * level_minus_first_value)
+    flatter = math.sqrt(
+        falls**2 + 4.0 * total_slope_change / interval_width * level_minus_first_value
+    )
     first = 2.0 * level_minus_first_value / (rises + steeper) if rises else 0.0
     last = (
         2.0 * level_minus_first_value / (falls + flatter)
         if falls > 0.0
-        else interval_width * (flatter - falls) / (2 * slope_change)
+        else interval_width * (flatter - falls) / (2 * total_slope_change)
     )
     return min(first, interval_width), min(last, interval_width)
 
 
-def _crossing_bounds_at_end(
+def _compute_crossing_bounds_at_curve_end(
     slopes: np.ndarray,
     interval_widths: np.ndarray,
     level_minus_inner_value: float,

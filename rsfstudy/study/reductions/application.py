@@ -17,10 +17,10 @@ from rsfstudy.status import Status
 from rsfstudy.study.reductions.base import (
     Reduction,
     add_propagated_errors,
-    failed_cell_mask,
-    mask_failures,
-    mask_unusable_values,
-    worst_status_along_other_dims,
+    find_worst_status_along_other_dims,
+    is_failed_or_pending,
+    set_failed_cells_to_nan,
+    set_unusable_values_to_nan,
 )
 from rsfstudy.study.reductions.boundaries import Boundary, Inverse
 from rsfstudy.study.reductions.comparisons import (
@@ -30,7 +30,7 @@ from rsfstudy.study.reductions.comparisons import (
     RelativeDifference,
 )
 from rsfstudy.study.reductions.fits import LinearFit, PowerLaw, ProportionalFit, SemilogFit
-from rsfstudy.study.reductions.result_units import describe_reduction_results
+from rsfstudy.study.reductions.result_units import build_result_quantities
 from rsfstudy.study.reductions.sobol_indices import SobolIndices
 from rsfstudy.study.reductions.statistics import (
     Logarithm,
@@ -63,10 +63,10 @@ __all__ = [
 ]
 
 #: Suffixes of the names of variables that describe the quality of a result.
-_SUFFIXES_OF_QUALITY_VARIABLES = ("error", "stderr", "misfit", "points", "status")
+_SUFFIXES_OF_ANCILLARY_VARIABLES = ("error", "stderr", "misfit", "points", "status")
 
 
-def _reducible_variable_names(dataset: xr.Dataset) -> list[str]:
+def _list_data_variable_names(dataset: xr.Dataset) -> list[str]:
     """Return the names of all data variables."""
     return list(map(str, dataset.data_vars))
 
@@ -115,7 +115,7 @@ def apply_reductions(
     3.0
     """
     lost = int(
-        (failed_cell_mask(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum()
+        (is_failed_or_pending(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum()
     )
     despite = {"despite": f"{lost} failed cells are omitted"} if lost and despite_failures else {}
     drawn: dict[str, xr.DataArray] = {}
@@ -125,14 +125,14 @@ def apply_reductions(
                 "of",
                 reduction.of,
                 "is not a result of the study",
-                choices=_reducible_variable_names(dataset),
+                choices=_list_data_variable_names(dataset),
             )
         leaves_out = despite and not reduction.uses_failed_cells
-        support = mask_failures(dataset) if leaves_out else dataset
-        own = worst_status_along_other_dims(support["status"], support[reduction.of].dims)
+        support = set_failed_cells_to_nan(dataset) if leaves_out else dataset
+        own = find_worst_status_along_other_dims(support["status"], support[reduction.of].dims)
         if not reduction.uses_failed_cells:
             own = drawn.get(reduction.of, own)
-        support = mask_unusable_values(support, reduction.of, own)
+        support = set_unusable_values_to_nan(support, reduction.of, own)
         found: object = reduction(support)  # A user-defined reduction may return any object.
         if not isinstance(found, xr.Dataset):
             rule = "must return an xarray.Dataset of the new variables"
@@ -141,7 +141,7 @@ def apply_reductions(
             raise InvalidValue(what, type(found).__name__, rule, remedy=remedy)
         made = add_propagated_errors(reduction, support, found)
         stated = {q.name: q for q in reduction.quantities}
-        quantities = describe_reduction_results(reduction, dataset, made)
+        quantities = build_result_quantities(reduction, dataset, made)
         for name, values in made.data_vars.items():
             if name in dataset:
                 rule = (
@@ -149,10 +149,10 @@ def apply_reductions(
                     f"{reduction.of!r}"
                 )
                 raise InvalidValue("reduction", reduction.name, rule)
-            drawn[str(name)] = worst_status_along_other_dims(
+            drawn[str(name)] = find_worst_status_along_other_dims(
                 reduction.support_status(support["status"]), values.dims
             )
-            if bool(failed_cell_mask(drawn[str(name)]).any()):
+            if bool(is_failed_or_pending(drawn[str(name)]).any()):
                 values.attrs.setdefault(
                     "refused", "some of the required cells failed or are missing"
                 )
@@ -162,7 +162,7 @@ def apply_reductions(
             if str(name) in stated and stated[str(name)].symbol:
                 about["symbol"] = stated[str(name)].symbol
             if beside := [
-                n for end in _SUFFIXES_OF_QUALITY_VARIABLES if (n := f"{name}_{end}") in made
+                n for end in _SUFFIXES_OF_ANCILLARY_VARIABLES if (n := f"{name}_{end}") in made
             ]:
                 about["ancillary_variables"] = " ".join(beside)
             values.attrs = {**about, **despite}

@@ -26,7 +26,7 @@ DatasetOrArray = TypeVar("DatasetOrArray", xr.Dataset, xr.DataArray)
 
 #: Pairs of two items. The first item is the derivative of a result with respect to the values of
 #: some cells. The second item contains coordinates of these cells along some dimensions.
-DerivativesByVariable = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
+DerivativesWithCellCoordinates = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
 #: Names of the reduction fields that determine the units of a result, by the suffix of the result
 #: name. Each field contains the name of a variable, and the units of the result are derived from
@@ -40,7 +40,7 @@ PROPAGATED_ERROR_COMMENT = (
 )
 #: Suffixes of the names of variables that contain standard errors, bounds of confidence intervals,
 #: covariances or correlations.
-_STATISTICAL_SUFFIXES = ("_stderr", "_low", "_high", "covariance", "correlation")
+_SUFFIXES_OF_UNCERTAINTY_VARIABLES = ("_stderr", "_low", "_high", "covariance", "correlation")
 #: Relative tolerance at the ends of a coordinate range. A coordinate value may differ from the end
 #: of a range by rounding errors.
 COORDINATE_RANGE_RTOL = 1e-9
@@ -173,7 +173,7 @@ class Reduction(ConstructorKeywordCheckMixin):
         """
         return status
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the result with respect to the cell values.
 
         A subclass must override this method to propagate the numerical errors of the cells to the
@@ -213,7 +213,7 @@ class Reduction(ConstructorKeywordCheckMixin):
         return {"kind": self.kind, **asdict(self)}
 
 
-def failed_cell_mask(status: xr.DataArray) -> xr.DataArray:
+def is_failed_or_pending(status: xr.DataArray) -> xr.DataArray:
     """Return a mask of the cells that failed or were not computed.
 
     Parameters
@@ -229,7 +229,7 @@ def failed_cell_mask(status: xr.DataArray) -> xr.DataArray:
     return status >= int(Status.WORK_BUDGET_SPENT)
 
 
-def worst_status_along_other_dims(
+def find_worst_status_along_other_dims(
     status: xr.DataArray, kept_dimensions: Collection[Hashable]
 ) -> xr.DataArray:
     """Return the largest status code along the dimensions that are not kept.
@@ -251,7 +251,7 @@ def worst_status_along_other_dims(
     return status.max([d for d in status.dims if d not in kept_dimensions])
 
 
-def mask_unusable_values(
+def set_unusable_values_to_nan(
     dataset: xr.Dataset, variable_name: str, status: xr.DataArray
 ) -> xr.Dataset:
     """Replace the values of failed cells and invalid error bounds by NaN.
@@ -274,15 +274,15 @@ def mask_unusable_values(
     xarray.Dataset
         Copy in which the values of failed cells and invalid error bounds are NaN.
     """
-    bad = failed_cell_mask(status)
-    if variable_name.endswith(_STATISTICAL_SUFFIXES):
+    bad = is_failed_or_pending(status)
+    if variable_name.endswith(_SUFFIXES_OF_UNCERTAINTY_VARIABLES):
         bad = bad | (status == int(Status.ERRORS_NOT_VALID))
     if bool(bad.any()) and dataset[variable_name].dtype.kind == "f":
         dataset = dataset.assign({variable_name: dataset[variable_name].where(~bad)})
     return dataset.assign(status=status)
 
 
-def refused_result_mask(
+def depends_on_failed_cells(
     dataset: xr.Dataset, variable_name: str, *reduced_dimensions: str
 ) -> xr.DataArray:
     """Return a mask of the results that depend on failed cells.
@@ -302,13 +302,13 @@ def refused_result_mask(
         True if a cell failed along the reduced dimensions or along dimensions that the variable
         does not have.
     """
-    bad = failed_cell_mask(dataset["status"])
+    bad = is_failed_or_pending(dataset["status"])
     return bad.any(
         [d for d in bad.dims if d in reduced_dimensions or d not in dataset[variable_name].dims]
     )
 
 
-def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
+def set_failed_cells_to_nan(dataset: xr.Dataset) -> xr.Dataset:
     """Treat failed cells as finished cells without a value.
 
     Pending cells are not changed.
@@ -324,7 +324,7 @@ def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
         Copy in which the values of failed cells are NaN, and the status of these cells is
         ``NO_STEP``.
     """
-    lost = failed_cell_mask(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
+    lost = is_failed_or_pending(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
     kept = {
         name: values.where(~lost)
         for name, values in dataset.data_vars.items()
@@ -334,7 +334,7 @@ def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign({**kept, "status": status})
 
 
-def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, coordinate_name: str) -> str:
+def find_dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, coordinate_name: str) -> str:
     """Return the dimension of a one-dimensional numeric coordinate.
 
     Parameters
@@ -394,7 +394,9 @@ def select_coordinate_range(
     inside = (values >= lowest - COORDINATE_RANGE_RTOL * abs(lowest)) & (
         values <= highest + COORDINATE_RANGE_RTOL * abs(highest)
     )
-    return dataset.isel({dimension_of_coordinate(dataset, coordinate_name): np.flatnonzero(inside)})
+    return dataset.isel(
+        {find_dimension_of_coordinate(dataset, coordinate_name): np.flatnonzero(inside)}
+    )
 
 
 def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity]:

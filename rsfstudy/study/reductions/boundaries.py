@@ -18,20 +18,20 @@ from scipy.interpolate import PchipInterpolator
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.quantities import Quantity
 from rsfstudy.study.reductions._level_crossing import (
-    MIN_SAMPLES_OF_CURVE,
-    CrossingStatus,
-    find_crossing,
+    MIN_SAMPLES_FOR_CROSSING_SEARCH,
+    CrossingSearchStatus,
+    find_unique_crossing,
 )
 from rsfstudy.study.reductions.base import (
-    DerivativesByVariable,
+    DerivativesWithCellCoordinates,
     Reduction,
     UnitFieldsByResultSuffix,
-    dimension_of_coordinate,
-    refused_result_mask,
+    depends_on_failed_cells,
+    find_dimension_of_coordinate,
 )
 
 #: Change of ln(value) in the finite differences for the derivatives of an interpolant.
-_LOG_STEP_OF_DERIVATIVES = 1e-6
+_LOG_STEP_FOR_FINITE_DIFFERENCES = 1e-6
 
 
 @wrap_methods_in_error_boundary
@@ -98,11 +98,11 @@ class Boundary(Reduction):
         InvalidValue
             If ``on`` is not a one-dimensional numeric coordinate.
         """
-        dimension = dimension_of_coordinate(dataset, self.on)
-        values = dataset[self.of].where(~refused_result_mask(dataset, self.of, dimension))
+        dimension = find_dimension_of_coordinate(dataset, self.on)
+        values = dataset[self.of].where(~depends_on_failed_cells(dataset, self.of, dimension))
         if f"{self.of}_error" in dataset:
             values = values.where(~(abs(values - self.level) <= dataset[f"{self.of}_error"]))
-        stable, unstable, crossings = self.bracket(values)
+        stable, unstable, crossings = self.bracket_threshold_crossing(values)
         once = crossings == 1
         note = f"between cells of {self.of} below and above {self.level:g} along {self.on}"
         found = {
@@ -114,7 +114,7 @@ class Boundary(Reduction):
         }
         return self.results(note, found)
 
-    def bracket(self, values: xr.DataArray) -> tuple[xr.DataArray, ...]:
+    def bracket_threshold_crossing(self, values: xr.DataArray) -> tuple[xr.DataArray, ...]:
         """Bracket the first crossing of the threshold.
 
         Parameters
@@ -131,7 +131,7 @@ class Boundary(Reduction):
         crossings : xarray.DataArray
             Number of crossings, or NaN if there are no values.
         """
-        dimension = dimension_of_coordinate(values, self.on)
+        dimension = find_dimension_of_coordinate(values, self.on)
         edges: tuple[xr.DataArray, ...] = xr.apply_ufunc(
             self._bracket_boundary_along_coordinate,
             values,
@@ -217,7 +217,7 @@ class Inverse(Reduction):
     @property
     def quantities(self) -> Sequence[Quantity]:
         """Quantity that describes the status variable ``<name>_status``."""
-        flags = tuple(verdict.name.lower() for verdict in CrossingStatus)
+        flags = tuple(verdict.name.lower() for verdict in CrossingSearchStatus)
         text = f"status of {self.name.replace('_', ' ')}"
         return [Quantity(f"{self.name}_status", "", "1", text, flags=flags)]
 
@@ -240,12 +240,12 @@ class Inverse(Reduction):
         InvalidValue
             If ``on`` is not a one-dimensional numeric coordinate.
         """
-        dimension = dimension_of_coordinate(dataset, self.on)
-        if dataset.sizes[dimension] < MIN_SAMPLES_OF_CURVE:
+        dimension = find_dimension_of_coordinate(dataset, self.on)
+        if dataset.sizes[dimension] < MIN_SAMPLES_FOR_CROSSING_SEARCH:
             return xr.Dataset()
-        values = dataset[self.of].where(~refused_result_mask(dataset, self.of, dimension))
+        values = dataset[self.of].where(~depends_on_failed_cells(dataset, self.of, dimension))
         crossing, error, verdict = xr.apply_ufunc(
-            _invert_along_coordinate,
+            _find_coordinate_at_level,
             values,
             dataset[self.on].astype(float),
             self._select_value_for_each_label(dataset, self.levels),
@@ -267,7 +267,7 @@ class Inverse(Reduction):
             }
         )
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the crossing position.
 
         The interpolant is differentiated with respect to the value of each cell, and the derivative
@@ -284,9 +284,9 @@ class Inverse(Reduction):
             Pairs of a derivative and the position of the cells, as described in
             `Reduction.derivatives`.
         """
-        dimension = dimension_of_coordinate(dataset, self.on)
+        dimension = find_dimension_of_coordinate(dataset, self.on)
         by_cells = xr.apply_ufunc(
-            _crossing_position_derivatives,
+            _compute_crossing_position_derivatives,
             dataset[self.of],
             dataset[self.on].astype(float),
             self._select_value_for_each_label(dataset, self.levels),
@@ -297,34 +297,37 @@ class Inverse(Reduction):
         return [(by_cells, {})]
 
     def _select_value_for_each_label(
-        self, dataset: xr.Dataset, values: float | Mapping[str, float]
+        self, dataset: xr.Dataset, value_or_values_by_label: float | Mapping[str, float]
     ) -> xr.DataArray:
         """Return the level or uncertainty that applies to each label."""
-        if not isinstance(values, Mapping):
-            return xr.DataArray(float(values))
+        if not isinstance(value_or_values_by_label, Mapping):
+            return xr.DataArray(float(value_or_values_by_label))
         labels = dataset[self.along]
-        stated = [float(values.get(label, np.nan)) for label in labels.values]
+        stated = [float(value_or_values_by_label.get(label, np.nan)) for label in labels.values]
         return xr.DataArray(stated, {self.along: labels}, self.along)
 
 
-def _invert_along_coordinate(
-    values: np.ndarray, coordinate: np.ndarray, level: float, uncertainty: float
+def _find_coordinate_at_level(
+    values: np.ndarray, coordinate: np.ndarray, level: float, log_level_uncertainty: float
 ) -> tuple[float, float, float]:
     """Return the position, error and status of the level crossing of one curve."""
     x, y, _places = _take_logs_of_positive_samples(values, coordinate)
     if np.isnan(level) or level <= 0.0:
-        return np.nan, np.nan, float(CrossingStatus.OUT_OF_REACH)
-    found = find_crossing(x, y, np.log(level))
-    if found.status is not CrossingStatus.OK:
+        return np.nan, np.nan, float(CrossingSearchStatus.OUT_OF_REACH)
+    found = find_unique_crossing(x, y, np.log(level))
+    if found.status is not CrossingSearchStatus.OK:
         return np.nan, np.nan, float(found.status)
-    ends = [find_crossing(x, y, np.log(level) + d).position for d in (-uncertainty, uncertainty)]
+    ends = [
+        find_unique_crossing(x, y, np.log(level) + d).position
+        for d in (-log_level_uncertainty, log_level_uncertainty)
+    ]
     place, first, last = np.exp([found.position, found.lower_bound, found.upper_bound]).tolist()
     error = max(place - first, last - place)
     error += place * float(np.max(np.abs(found.position - np.array(ends))))
     return place, error, float(found.status)
 
 
-def _crossing_position_derivatives(
+def _compute_crossing_position_derivatives(
     values: np.ndarray, coordinate: np.ndarray, level: float
 ) -> np.ndarray:
     """Return the derivatives of the crossing position.
@@ -335,16 +338,22 @@ def _crossing_position_derivatives(
     slopes = np.zeros(values.size)
     if np.isnan(level) or level <= 0.0:
         return slopes
-    fine = find_crossing(x, y, np.log(level)).position
+    fine = find_unique_crossing(x, y, np.log(level)).position
     if np.isnan(fine):
         return slopes
     # The values are changed one at a time. The interpolant is a smooth function of the values,
     # except at isolated kinks.
-    moved = PchipInterpolator(x, y + _LOG_STEP_OF_DERIVATIVES * np.eye(x.size), axis=1)(fine)
+    moved = PchipInterpolator(x, y + _LOG_STEP_FOR_FINITE_DIFFERENCES * np.eye(x.size), axis=1)(
+        fine
+    )
     # If the slope is zero, the errors are unbounded.
     rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan
     slopes[places] = (
-        (moved - np.log(level)) / _LOG_STEP_OF_DERIVATIVES / rise * np.exp(fine) / values[places]
+        (moved - np.log(level))
+        / _LOG_STEP_FOR_FINITE_DIFFERENCES
+        / rise
+        * np.exp(fine)
+        / values[places]
     )
     return slopes
 

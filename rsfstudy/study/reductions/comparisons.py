@@ -17,15 +17,15 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import CLOSED_FORMS
 from rsfstudy.study.reductions.base import (
-    DerivativesByVariable,
+    DerivativesWithCellCoordinates,
     Reduction,
     UnitFieldsByResultSuffix,
-    dimension_of_coordinate,
-    refused_result_mask,
+    depends_on_failed_cells,
+    find_dimension_of_coordinate,
     select_coordinate_range,
 )
 
-ValueAndReferenceDerivatives = tuple[xr.DataArray, xr.DataArray]
+DerivativesForValueAndReference = tuple[xr.DataArray, xr.DataArray]
 
 
 @wrap_methods_in_error_boundary
@@ -63,9 +63,9 @@ class Difference(Reduction):
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
-    formula: ClassVar[str] = "{of} minus {reference}"
+    formula_template: ClassVar[str] = "{of} minus {reference}"
 
-    def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
+    def compute_difference(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """Subtract the reference from the values.
 
         Parameters
@@ -82,9 +82,9 @@ class Difference(Reduction):
         """
         return values - reference
 
-    def partial_derivatives(
+    def compute_partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
-    ) -> ValueAndReferenceDerivatives:
+    ) -> DerivativesForValueAndReference:
         """Compute the derivatives with respect to the value and the reference.
 
         Parameters
@@ -135,12 +135,14 @@ class Difference(Reduction):
         values = dataset[self.of]
         if self.along not in values.dims or self.reference not in dataset[self.along].values:
             return xr.Dataset()
-        compared = self.compare(values, values.sel({self.along: self.reference}, drop=True))
+        compared = self.compute_difference(
+            values, values.sel({self.along: self.reference}, drop=True)
+        )
         place = f"{self.along} = {self.reference}"
-        note = self.formula.format(of=self.of, reference=f"its value at {place}")
+        note = self.formula_template.format(of=self.of, reference=f"its value at {place}")
         return xr.Dataset({self.name: compared.assign_attrs(comment=note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the result.
 
         At the reference point, the derivatives are 0 because the result does not depend on the
@@ -158,7 +160,7 @@ class Difference(Reduction):
             `Reduction.derivatives`.
         """
         values, place = dataset[self.of], {self.along: self.reference}
-        own, others = self.partial_derivatives(values, values.sel(place, drop=True))
+        own, others = self.compute_partial_derivatives(values, values.sel(place, drop=True))
         apart = dataset[self.along] != self.reference
         return [(own.where(apart, 0.0), {}), (others.where(apart, 0.0), place)]
 
@@ -197,9 +199,9 @@ class RelativeDifference(Difference):
 
     kind: ClassVar[str] = "relative_difference"
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
-    formula: ClassVar[str] = "1 - {of} / {reference}"
+    formula_template: ClassVar[str] = "1 - {of} / {reference}"
 
-    def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
+    def compute_difference(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """Compute the relative difference.
 
         Parameters
@@ -216,9 +218,9 @@ class RelativeDifference(Difference):
         """
         return 1.0 - values / reference
 
-    def partial_derivatives(
+    def compute_partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
-    ) -> ValueAndReferenceDerivatives:
+    ) -> DerivativesForValueAndReference:
         """Compute the derivatives with respect to the value and the reference.
 
         Parameters
@@ -312,7 +314,7 @@ class Range(Reduction):
         if support.sizes[dimension] < 2:
             return xr.Dataset()
         of = support[self.of].reset_coords(drop=True)
-        known = ~refused_result_mask(support, self.of, dimension) & (
+        known = ~depends_on_failed_cells(support, self.of, dimension) & (
             of.notnull().sum(dimension) > 1
         )
         found = (of.max(dimension) - of.min(dimension)).where(known)
@@ -320,7 +322,7 @@ class Range(Reduction):
         note = f"largest minus smallest {self.of} along {self.over}{span}"
         return xr.Dataset({self.name: found.assign_attrs(comment=note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the range.
 
         The derivative is 1 for the cell whose value plus error is largest, and for the cell whose
@@ -347,7 +349,7 @@ class Range(Reduction):
     def _select_points_in_range(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
         """Return the dimension and the points in the coordinate range ``within``."""
         along = self.over in dataset[self.of].dims
-        dimension = self.over if along else dimension_of_coordinate(dataset, self.over)
+        dimension = self.over if along else find_dimension_of_coordinate(dataset, self.over)
         return dimension, select_coordinate_range(dataset, self.over, self.within)
 
 
@@ -417,12 +419,12 @@ class ClosedFormRatio(Reduction):
         if not all(name in dataset.coords for name in form.scene_field_names):
             return xr.Dataset()
         exact = self._evaluate_closed_form(dataset)
-        note = f"{form.formula}: {form.literature_citation}"
+        note = f"{form.formula_text}: {form.literature_citation}"
         ratio = (dataset[self.of] / exact).assign_attrs(comment=f"{self.of} divided by {note}")
         beside = {f"{self.name}_closed_form": exact.assign_attrs(comment=note)}
         return xr.Dataset({self.name: ratio, **beside})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the ratio (the reciprocal of the closed form).
 
         Parameters
@@ -442,5 +444,5 @@ class ClosedFormRatio(Reduction):
         """Evaluate the closed-form solution in each cell."""
         form = CLOSED_FORMS[self.form]
         fields = [dataset[name].astype(float) for name in form.scene_field_names]
-        exact: xr.DataArray = xr.apply_ufunc(form.function, *fields, vectorize=True)
+        exact: xr.DataArray = xr.apply_ufunc(form.formula_function, *fields, vectorize=True)
         return exact

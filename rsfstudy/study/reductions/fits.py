@@ -15,11 +15,11 @@ import xarray as xr
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.study.reductions.base import (
-    DerivativesByVariable,
+    DerivativesWithCellCoordinates,
     Reduction,
     UnitFieldsByResultSuffix,
-    dimension_of_coordinate,
-    refused_result_mask,
+    depends_on_failed_cells,
+    find_dimension_of_coordinate,
     select_coordinate_range,
 )
 
@@ -65,7 +65,7 @@ class LinearFit(Reduction):
     #: Number of fitted parameters, followed by a template of the fitted equation. The placeholders
     #: are field names of the fit.
     parameter_count: ClassVar[int] = 2
-    formula: ClassVar[str] = "{of} = constant + {name} * {on}"
+    formula_template: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of", "on"), "_misfit": ("of",)}
 
@@ -121,11 +121,11 @@ class LinearFit(Reduction):
         InvalidValue
             If ``on`` is not a one-dimensional numeric coordinate.
         """
-        dimension = dimension_of_coordinate(dataset, self.on)
+        dimension = find_dimension_of_coordinate(dataset, self.on)
         support = select_coordinate_range(dataset, self.on, self.within)
         if support.sizes[dimension] == 0:
             return xr.Dataset()
-        x, y = self._centred_fit_coordinates(support)
+        x, y = self._compute_centred_fit_coordinates(support)
         count = y.notnull().sum(dimension)
         slope = (x * y).sum(dimension) / (x**2).sum(dimension)
         misfit = y - slope * x
@@ -133,7 +133,9 @@ class LinearFit(Reduction):
         spread = (misfit**2).sum(dimension) / freedom.where(freedom > 0)
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
-        known = (count >= self.parameter_count) & ~refused_result_mask(support, self.of, dimension)
+        known = (count >= self.parameter_count) & ~depends_on_failed_cells(
+            support, self.of, dimension
+        )
         found = {
             "": slope.where(known),
             "_stderr": error.where(known),
@@ -142,11 +144,11 @@ class LinearFit(Reduction):
         }
         span = "all {on}" if self.within is None else "{0:g} <= {on} <= {1:g}"
         span = span.format(*(self.within or ()), on=self.on)
-        law = self.formula.format(**vars(self))
+        law = self.formula_template.format(**vars(self))
         result = self.results(f"least-squares fit of {law} for {span}", found)
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the slope with respect to the cell values.
 
         The slope is a linear combination of the values, and the derivatives are the coefficients.
@@ -162,19 +164,22 @@ class LinearFit(Reduction):
             Pairs of a derivative and the position of the cells, as described in
             `Reduction.derivatives`.
         """
-        x, _y = self._centred_fit_coordinates(
+        x, _y = self._compute_centred_fit_coordinates(
             select_coordinate_range(dataset, self.on, self.within)
         )
-        return [((x / (x**2).sum(dimension_of_coordinate(dataset, self.on))).fillna(0.0), {})]
+        return [((x / (x**2).sum(find_dimension_of_coordinate(dataset, self.on))).fillna(0.0), {})]
 
-    def _centred_fit_coordinates(
+    def _compute_centred_fit_coordinates(
         self, selected_points: xr.Dataset
     ) -> tuple[xr.DataArray, xr.DataArray]:
         """Return the transformed and centred coordinate and variable.
 
         Points without a value are NaN.
         """
-        dimension, of = dimension_of_coordinate(selected_points, self.on), selected_points[self.of]
+        dimension, of = (
+            find_dimension_of_coordinate(selected_points, self.on),
+            selected_points[self.of],
+        )
         # The array is made contiguous, because sums over arrays with another memory layout differ
         # in the last bit.
         of = of.copy(data=np.ascontiguousarray(of.values))
@@ -197,7 +202,7 @@ class LinearFit(Reduction):
         """
         return values
 
-    def transform_abscissa(self, on: xr.DataArray) -> xr.DataArray:
+    def transform_abscissa(self, coordinate_values: xr.DataArray) -> xr.DataArray:
         """Transform the coordinate before the fit.
 
         Parameters
@@ -210,7 +215,7 @@ class LinearFit(Reduction):
         xarray.DataArray
             Unchanged values.
         """
-        return on
+        return coordinate_values
 
 
 @accept_former_keyword_names
@@ -254,7 +259,7 @@ class ProportionalFit(LinearFit):
     intercept: float = 0.0
     parameter_count: ClassVar[int] = 1
     kind: ClassVar[str] = "proportional_fit"
-    formula: ClassVar[str] = "{of} = {intercept:g} + {name} * {on}"
+    formula_template: ClassVar[str] = "{of} = {intercept:g} + {name} * {on}"
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Return the values unchanged, because the intercept is fixed.
@@ -327,9 +332,9 @@ class SemilogFit(LinearFit):
 
     kind: ClassVar[str] = "decade_fit"
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
-    formula: ClassVar[str] = "{of} = constant + {name} * log10({on})"
+    formula_template: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
-    def transform_abscissa(self, on: xr.DataArray) -> xr.DataArray:
+    def transform_abscissa(self, coordinate_values: xr.DataArray) -> xr.DataArray:
         """Compute the decimal logarithm of the coordinate.
 
         Parameters
@@ -342,7 +347,9 @@ class SemilogFit(LinearFit):
         xarray.DataArray
             Decimal logarithm. NaN if the value is not positive.
         """
-        logarithms: xr.DataArray = xr.apply_ufunc(np.log10, on.where(on > 0.0))
+        logarithms: xr.DataArray = xr.apply_ufunc(
+            np.log10, coordinate_values.where(coordinate_values > 0.0)
+        )
         return logarithms
 
 
@@ -382,7 +389,7 @@ class PowerLaw(SemilogFit):
 
     kind: ClassVar[str] = "power_law"
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
-    formula: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
+    formula_template: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
         """Compute the decimal logarithm of the variable.
@@ -399,7 +406,7 @@ class PowerLaw(SemilogFit):
         """
         return self.transform_abscissa(values)
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the exponent with respect to the cell values.
 
         The derivatives are the coefficients of the linear fit divided by ``ln(10) * of``.

@@ -16,14 +16,14 @@ from rsfstudy.study.reductions.base import Reduction, read_quantities_not_in_voc
 from rsfstudy.vocabulary import find_quantity
 
 #: Names of the coordinates that contain the scales of quantities, by the symbol of the scale.
-_COORDINATE_NAME_BY_SCALE = {
+_SCALE_COORDINATE_BY_SCALE_SYMBOL = {
     "sigma_*": "sigma_star",
     "D_c": "slip_distance",
     "V_*": "reference_velocity",
 }
 
 
-def describe_reduction_results(
+def build_result_quantities(
     reduction: Reduction, dataset: xr.Dataset, reduction_results: xr.Dataset
 ) -> dict[str, Quantity]:
     """Determine the quantities of the results of a reduction.
@@ -62,7 +62,9 @@ def describe_reduction_results(
             format_unit_quotient([a.get(key) or "1" for a in drawn]) for key in ("units", "scale")
         )
         across = {*of.dims} - {*reduction_results[name].dims} | {vars(reduction).get("along")}
-        if varied := find_varying_scale(dataset, f"{of.attrs.get('scale')} {scale}", across):
+        if varied := find_scale_varying_along_dimensions(
+            dataset, f"{of.attrs.get('scale')} {scale}", across
+        ):
             why = f"; combines cells in units of {varied}, which varies between the cells"
             reduction_results[name].attrs["comment"] = (
                 reduction_results[name].attrs.get("comment", "") + why
@@ -77,7 +79,7 @@ def describe_reduction_results(
     return found
 
 
-def find_varying_scale(
+def find_scale_varying_along_dimensions(
     dataset: xr.Dataset, scale_expression: str, reduced_dimensions: Collection[Hashable]
 ) -> str:
     """Find a scale that varies along reduced dimensions.
@@ -99,7 +101,7 @@ def find_varying_scale(
     """
     held = {
         part: dataset[n].dims
-        for part, n in _COORDINATE_NAME_BY_SCALE.items()
+        for part, n in _SCALE_COORDINATE_BY_SCALE_SYMBOL.items()
         if n in dataset.coords
     }
     return next(

@@ -16,12 +16,12 @@ import xarray as xr
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
-from rsfstudy.study.reductions.base import Reduction, refused_result_mask
+from rsfstudy.study.reductions.base import Reduction, depends_on_failed_cells
 
 #: Number of bootstrap resamples, number of resamples per batch, and seed of the random generator.
 _BOOTSTRAP_RESAMPLES, _RESAMPLES_PER_BATCH, _RESAMPLING_SEED = 400, 25, 2010
 #: Probabilities of the bounds of the confidence interval.
-_INTERVAL_QUANTILES = (0.025, 0.975)
+_CONFIDENCE_INTERVAL_QUANTILES = (0.025, 0.975)
 _SOBOL_INDEX_NAMES = ("first_order", "total")
 
 
@@ -81,9 +81,12 @@ class SobolIndices(Reduction):
     def quantities(self) -> Sequence[Quantity]:
         """Quantities that describe the indices, their bounds and the new dimension."""
         about = Quantity("input", "", "", "sampled quantity")
-        return (about, *(Quantity(n, "", "1", text) for n, text in self._result_descriptions()))
+        return (
+            about,
+            *(Quantity(n, "", "1", text) for n, text in self._list_result_names_and_descriptions()),
+        )
 
-    def _result_descriptions(self) -> Iterator[tuple[str, str]]:
+    def _list_result_names_and_descriptions(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the description of each result."""
         for order in _SOBOL_INDEX_NAMES:
             text = f"{order.replace('_', '-')} Sobol index of {self.of.replace('_', ' ')}"
@@ -110,15 +113,15 @@ class SobolIndices(Reduction):
         InvalidValue
             If the samples were not drawn for Sobol indices, or if some samples are missing.
         """
-        inputs = self._sampled_inputs(dataset)
+        inputs = self._read_names_of_sampled_quantities(dataset)
         of, d = dataset[self.of].transpose(..., self.over), len(inputs)
         others = of.dims[:-1]
-        bad = refused_result_mask(dataset, self.of, self.over) | of.isnull().any(self.over)
+        bad = depends_on_failed_cells(dataset, self.of, self.over) | of.isnull().any(self.over)
         found = np.full((*of.shape[:-1], len(_SOBOL_INDEX_NAMES), 3, d), np.nan)
         for place in np.ndindex(*of.shape[:-1]):
             values = of.values[place]
             if not bool(bad.isel(dict(zip(others, place, strict=True)))) and np.ptp(values) > 0.0:
-                found[place] = _indices_with_intervals(values.reshape(-1, d + 2).T)
+                found[place] = _compute_indices_with_intervals(values.reshape(-1, d + 2).T)
         lost = int(of.isnull().sum())
         about = {"comment": f"confidence intervals from {_BOOTSTRAP_RESAMPLES} bootstrap resamples"}
         if lost:
@@ -128,7 +131,7 @@ class SobolIndices(Reduction):
             )
         elif np.isnan(found).any():
             about["refused"] = f"cells failed, or {self.of} has the same value in all cells"
-        names = iter(name for name, _text in self._result_descriptions())
+        names = iter(name for name, _text in self._list_result_names_and_descriptions())
         return xr.Dataset(
             {
                 next(names): ((*others, "input"), found[..., result, end, :], about)
@@ -138,7 +141,7 @@ class SobolIndices(Reduction):
             {**{n: c for n, c in of.coords.items() if self.over not in c.dims}, "input": inputs},
         )
 
-    def _sampled_inputs(self, dataset: xr.Dataset) -> list[str]:
+    def _read_names_of_sampled_quantities(self, dataset: xr.Dataset) -> list[str]:
         """Return the names of the sampled quantities."""
         if self.over not in dataset[self.of].dims:
             raise InvalidValue("over", self.over, f"is not a dimension of {self.of}")
@@ -155,7 +158,7 @@ class SobolIndices(Reduction):
         return inputs
 
 
-def _indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
+def _compute_indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
     """Compute Sobol indices with confidence intervals.
 
     Parameters
@@ -174,13 +177,13 @@ def _indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
     resampled = []
     for _ in range(_BOOTSTRAP_RESAMPLES // _RESAMPLES_PER_BATCH):
         again = random.integers(count, size=(_RESAMPLES_PER_BATCH, count))
-        resampled.append(_saltelli_indices(sample_values[:, again]))
-    ends = np.quantile(np.concatenate(resampled, axis=1), _INTERVAL_QUANTILES, axis=1)
-    best = _saltelli_indices(sample_values[:, None, :])[:, 0]
+        resampled.append(_compute_saltelli_indices(sample_values[:, again]))
+    ends = np.quantile(np.concatenate(resampled, axis=1), _CONFIDENCE_INTERVAL_QUANTILES, axis=1)
+    best = _compute_saltelli_indices(sample_values[:, None, :])[:, 0]
     return np.stack([best, *ends], axis=1)
 
 
-def _saltelli_indices(sample_values: np.ndarray) -> np.ndarray:
+def _compute_saltelli_indices(sample_values: np.ndarray) -> np.ndarray:
     """Compute the first-order and total indices of several sets of values.
 
     Parameters

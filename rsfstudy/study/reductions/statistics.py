@@ -24,12 +24,12 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.status import Status
 from rsfstudy.study.reductions.base import (
-    DerivativesByVariable,
+    DerivativesWithCellCoordinates,
     Reduction,
     UnitFieldsByResultSuffix,
-    refused_result_mask,
+    depends_on_failed_cells,
 )
-from rsfstudy.study.reductions.result_units import find_varying_scale
+from rsfstudy.study.reductions.result_units import find_scale_varying_along_dimensions
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,9 @@ class _SampleStatistic(Reduction):
     #: Minimum number of samples for which the statistic and its standard error are computed.
     min_samples: ClassVar[int] = 2
 
-    def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    def compute_value_and_stderr(
+        self, sample_values: xr.DataArray
+    ) -> tuple[xr.DataArray, xr.DataArray]:
         """Compute the statistic and its standard error.
 
         Parameters
@@ -106,8 +108,10 @@ class _SampleStatistic(Reduction):
         """
         of, why = _select_sampled_variable(self, dataset), ""
         count = of.notnull().sum(self.over)
-        bad = refused_result_mask(dataset, self.of, self.over)
-        if varied := find_varying_scale(dataset, of.attrs.get("scale", ""), {self.over}):
+        bad = depends_on_failed_cells(dataset, self.of, self.over)
+        if varied := find_scale_varying_along_dimensions(
+            dataset, of.attrs.get("scale", ""), {self.over}
+        ):
             bad, why = (
                 xr.ones_like(bad),
                 (f"{self.of} is in units of {varied}, which varies between the samples"),
@@ -119,13 +123,13 @@ class _SampleStatistic(Reduction):
         known, said = (count >= self.min_samples) & ~bad, {"refused": why} if why else {}
         value, stderr = (
             result.where(known).drop_attrs(deep=False).assign_attrs(said)
-            for result in self.compute(of)
+            for result in self.compute_value_and_stderr(of)
         )
         found = {"": value, "_stderr": stderr, "_points": count.astype("int32")}
         return self.results(f"{self.description} of {self.of} over {self.over}", found)
 
 
-def standard_deviation(
+def compute_standard_deviation(
     values: xr.DataArray, sample_dimension: str, degrees_of_freedom_lost: int = 1
 ) -> xr.DataArray:
     """Compute the standard deviation of samples.
@@ -181,7 +185,9 @@ class Mean(_SampleStatistic):
     kind: ClassVar[str] = "mean"
     description: ClassVar[str] = "mean"
 
-    def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    def compute_value_and_stderr(
+        self, sample_values: xr.DataArray
+    ) -> tuple[xr.DataArray, xr.DataArray]:
         """Compute the mean and its standard error.
 
         The standard error is the standard deviation divided by the square root of the number of
@@ -199,10 +205,12 @@ class Mean(_SampleStatistic):
         stderr : xarray.DataArray
             Standard error.
         """
-        count = of.notnull().sum(self.over)
-        return of.mean(self.over), standard_deviation(of, self.over) / count**0.5
+        count = sample_values.notnull().sum(self.over)
+        return sample_values.mean(self.over), compute_standard_deviation(
+            sample_values, self.over
+        ) / count**0.5
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the mean (the reciprocal of the sample count).
 
         Parameters
@@ -257,7 +265,9 @@ class StandardDeviation(_SampleStatistic):
     description: ClassVar[str] = "standard deviation"
     min_samples = 3
 
-    def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    def compute_value_and_stderr(
+        self, sample_values: xr.DataArray
+    ) -> tuple[xr.DataArray, xr.DataArray]:
         """Compute the standard deviation and its standard error.
 
         The standard deviation has n - 1 degrees of freedom. The standard error is a jackknife
@@ -281,13 +291,16 @@ class StandardDeviation(_SampleStatistic):
         .. [1] Efron and Stein (1981), The jackknife estimate of variance. Annals of Statistics 9,
            586-596.
         """
-        count, apart = of.notnull().sum(self.over), of - of.mean(self.over)
+        count, apart = (
+            sample_values.notnull().sum(self.over),
+            sample_values - sample_values.mean(self.over),
+        )
         rest = (apart**2).sum(self.over) - apart**2 * count / (count - 1.0)
         without = (rest.clip(min=0.0) / (count - 2.0).where(count > 2)) ** 0.5
-        scatter = standard_deviation(without, self.over, 0) * (count - 1.0) ** 0.5
-        return standard_deviation(of, self.over), scatter
+        scatter = compute_standard_deviation(without, self.over, 0) * (count - 1.0) ** 0.5
+        return compute_standard_deviation(sample_values, self.over), scatter
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         r"""Compute the derivatives of the standard deviation.
 
         Parameters
@@ -309,7 +322,7 @@ class StandardDeviation(_SampleStatistic):
         """
         of = _select_sampled_variable(self, dataset)
         freedom = of.notnull().sum(self.over) - 1
-        by = (of - of.mean(self.over)) / (freedom * standard_deviation(of, self.over))
+        by = (of - of.mean(self.over)) / (freedom * compute_standard_deviation(of, self.over))
         return [(by.fillna(0.0), {})]
 
 
@@ -374,7 +387,9 @@ class Quantile(_SampleStatistic):
         rarer = min(self.level, 1.0 - self.level)
         return max(2, math.ceil((1.0 - rarer) / rarer - 1e-9))
 
-    def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    def compute_value_and_stderr(
+        self, sample_values: xr.DataArray
+    ) -> tuple[xr.DataArray, xr.DataArray]:
         r"""Compute the quantile and its standard error.
 
         Parameters
@@ -395,9 +410,9 @@ class Quantile(_SampleStatistic):
 
         .. math:: \frac{Q(p + s) - Q(p - s)}{2}, \quad s = \sqrt{\frac{p (1 - p)}{n}}.
         """
-        apart = (self.level * (1.0 - self.level) / of.notnull().sum(self.over)) ** 0.5
+        apart = (self.level * (1.0 - self.level) / sample_values.notnull().sum(self.over)) ** 0.5
         found = [
-            _interpolated_quantile(of, self.over, self.level + sign * apart)
+            _compute_interpolated_quantile(sample_values, self.over, self.level + sign * apart)
             for sign in (0.0, -1.0, 1.0)
         ]
         return found[0], 0.5 * (found[2] - found[1])
@@ -432,7 +447,8 @@ class Quantile(_SampleStatistic):
         errors = dataset[beside].reset_coords(drop=True)
         errors = (errors + sys.float_info.epsilon * abs(of)).fillna(np.inf)
         low, high = (
-            _interpolated_quantile(of + sign * errors, self.over, at) for sign in (-1.0, 1.0)
+            _compute_interpolated_quantile(of + sign * errors, self.over, at)
+            for sign in (-1.0, 1.0)
         )
         down, up = found[self.name] - low, high - found[self.name]
         error = down.where(down > up, up)
@@ -441,7 +457,7 @@ class Quantile(_SampleStatistic):
         return found.assign({f"{self.name}_error": error})
 
 
-def _interpolated_quantile(
+def _compute_interpolated_quantile(
     values: xr.DataArray, sample_dimension: str, quantile_level: xr.DataArray
 ) -> xr.DataArray:
     """Interpolate a quantile linearly between neighbouring samples."""
@@ -590,7 +606,7 @@ class Logarithm(Reduction):
         note = {"comment": f"natural logarithm of the numerical value of {self.of}"}
         return xr.Dataset({self.name: logarithm.drop_attrs(deep=False).assign_attrs(note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
         """Compute the derivatives of the logarithm (the reciprocal of the variable).
 
         Parameters

@@ -19,12 +19,15 @@ import numpy as np
 
 from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle_search import LimitCycleSearch
-from rsfstudy.limit_cycles.stick_slip_cycles import _cycle_event_specifications, iterate_cycles
+from rsfstudy.limit_cycles.stick_slip_cycles import (
+    _build_cycle_event_specifications,
+    iterate_stick_slip_cycles,
+)
 from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
-from rsfstudy.slider.equations import RUPTURE_REGIME, equations_between_ruptures
+from rsfstudy.slider.equations import RUPTURE_REGIME, build_equations_between_ruptures
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.path_length import LOG_SLIP_RATE_PER_PATH_LENGTH
 
@@ -92,16 +95,16 @@ def cycle_problem(scene: Scene) -> Problem:
     """Return the problem of a scene, without marks."""
     tight = Accuracy(MIN_RTOL, budget=BUDGET, engine="compiled")
     approach = LimitCycleSearch(scene, Integrator(tight))
-    if not approach.follow_until_converged(300):
+    if not approach.follow_cycles_until_converged(300):
         raise ValueError(f"no limit cycle: {scene}")
     begin = approach.cycles[-1].end_point
-    truth = next(iterate_cycles(scene, Integrator(tight), begin))
+    truth = next(iterate_stick_slip_cycles(scene, Integrator(tight), begin))
     coupling = scene.parts.normal_stress.coupling
     assert truth is not None
     assert coupling is not None
     mass, load, log_load = scene.inertial_time, scene.load_velocity, scene.log_load_velocity
     common = scene.a, scene.b, scene.mu_star, scene.stiffness, load, log_load
-    slow = equations_between_ruptures(scene, with_time=True)
+    slow = build_equations_between_ruptures(scene, with_time=True)
     passing = slow.evaluate_rates((begin.spring_stress, *begin.psis, 0.0))[-1]
     return Problem(
         scene=scene,
@@ -111,7 +114,7 @@ def cycle_problem(scene: Scene) -> Problem:
         / passing
         / (2.0 * scene.load_velocity),
         interval=truth.recurrence_interval,
-        drop=truth.max_spring_stress - truth.min_spring_stress,
+        drop=truth.max_spring_stress_deviation - truth.min_spring_stress_deviation,
     )
 
 
@@ -121,12 +124,12 @@ def with_marks(it: Problem, rtol: float) -> Problem:
     allowed = Accuracy(rtol, budget=BUDGET, engine="compiled")
     moving = Integrator(allowed).follow(
         scene,
-        _cycle_event_specifications(scene.log_load_velocity),
+        _build_cycle_event_specifications(scene.log_load_velocity),
         start=it.begin,
         with_time=True,
     )
     for event in moving:
-        if event.kind is EventKind.REGIME:
+        if event.kind is EventKind.REGIME_CHANGE:
             entering = event.regime == RUPTURE_REGIME
             passed["leave" if entering else "land"] = event.time
             passed["landed"] = event.point.spring_stress
@@ -155,7 +158,7 @@ def stretch_lengths(scene: Scene, accuracy: Accuracy, begin: MotionPoint) -> lis
         if event.regime != regime:
             regime = event.regime
             lengths.append(0.0)
-        lengths[-1] = event.clock
+        lengths[-1] = event.independent_variable
         if len(lengths) == 3 and event.kind is EventKind.RISE:
             break
     return lengths

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contest.hand_written_loops import CycleNumbers
 from contest.problem import BUDGET, Problem
-from rsfstudy.limit_cycles.stick_slip_cycles import iterate_cycles
+from rsfstudy.limit_cycles.stick_slip_cycles import iterate_stick_slip_cycles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.integrator import Integrator
 
@@ -25,9 +25,12 @@ class RsfstudyEngine:
         found: CycleNumbers = []
         self.integrator = Integrator(Accuracy(tolerance, budget=BUDGET, engine=self.engine))
         for it in problems:
-            cycle = next(iterate_cycles(it.scene, self.integrator, it.begin))
+            cycle = next(iterate_stick_slip_cycles(it.scene, self.integrator, it.begin))
             assert cycle is not None
             found.append(
-                (cycle.recurrence_interval, cycle.max_spring_stress - cycle.min_spring_stress)
+                (
+                    cycle.recurrence_interval,
+                    cycle.max_spring_stress_deviation - cycle.min_spring_stress_deviation,
+                )
             )
         return found
