@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from rsfstudy.api.healing_tables import healing as healing
     from rsfstudy.api.html_report import report as report
     from rsfstudy.api.simulation import simulate as simulate
-    from rsfstudy.api.single_scene import critical_step as critical_step
-    from rsfstudy.api.single_scene import limit_cycle as limit_cycle
-    from rsfstudy.api.single_scene import to_si as to_si
+    from rsfstudy.api.single_scene_measures import critical_step as critical_step
+    from rsfstudy.api.single_scene_measures import limit_cycle as limit_cycle
+    from rsfstudy.api.single_scene_measures import to_si as to_si
     from rsfstudy.api.study_runs import check as check
     from rsfstudy.api.study_runs import compare as compare
     from rsfstudy.api.study_runs import open as open
@@ -80,7 +80,7 @@ _EXPORTED_NAMES_BY_MODULE = {
     ),
     "api.html_report": ("report",),
     "api.simulation": ("simulate",),
-    "api.single_scene": ("critical_step", "limit_cycle", "to_si"),
+    "api.single_scene_measures": ("critical_step", "limit_cycle", "to_si"),
     "api.event_catalogue": ("events",),
     "api.healing_tables": ("healing",),
     "explorer.entry_points": ("explore",),

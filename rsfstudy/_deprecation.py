@@ -511,7 +511,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "Plain": "PlainValue",
         "Value": "OutputValue",
     },
-    "rsfstudy.measure_base._recorded_motion": {
+    "rsfstudy.measure_base._recording_measure": {
         "Recorded": "RecordingMeasure",
         "recorded": "create_outputs_along_phase",
     },
@@ -550,7 +550,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.plots._text:format_slope()": {
         "most": "max_decimals",
     },
-    "rsfstudy.storage.comparison:Comparison": {
+    "rsfstudy.storage.results_comparison:Comparison": {
         "points": "differing_axis_points",
         "cells": "finished_cell_counts",
         "numbers": "agreement_table",

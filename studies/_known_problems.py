@@ -193,17 +193,19 @@ class ProblemMeasure(Measure):
         DataError
             If a problem is not registered.
         """
-        from rsfstudy.storage import plain_data  # Worker processes do not need this module.
+        from rsfstudy.storage import (
+            plain_data_conversion,  # Worker processes do not need this module.
+        )
 
         if "problems" not in described:
             return {}
         known = [json.loads(json.dumps(problem.describe())) for problem in REGISTERED_PROBLEMS]
-        listed = plain_data.convert_plain_data(
+        listed = plain_data_conversion.convert_plain_data(
             described.pop("problems"), Sequence[dict[str, Any]], path
         )
         for number, each in enumerate(listed):
             if each not in known:
-                raise plain_data.build_invalid_entry_error(
+                raise plain_data_conversion.build_invalid_entry_error(
                     f"{path}.problems[{number}]", "does not belong to a study"
                 )
         return {"problems": tuple(REGISTERED_PROBLEMS[known.index(each)] for each in listed)}

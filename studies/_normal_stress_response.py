@@ -17,7 +17,7 @@ import numpy as np
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import RecordingMeasure, create_outputs_along_phase
-from rsfstudy.measure_base._recorded_motion import VARIABLES_RECORDED_ALONG_PHASE
+from rsfstudy.measure_base._recording_measure import VARIABLES_RECORDED_ALONG_PHASE
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import Event, Integrator
 from rsfstudy.responses import estimate_errors_at_instants

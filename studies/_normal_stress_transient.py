@@ -19,7 +19,7 @@ from rsfstudy.measure_base import (
     check_loading_changes_stress_only_in_steps,
     create_outputs_along_phase,
 )
-from rsfstudy.measure_base._recorded_motion import VARIABLES_RECORDED_ALONG_PHASE
+from rsfstudy.measure_base._recording_measure import VARIABLES_RECORDED_ALONG_PHASE
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import Accuracy, Event, Integrator, Recording, resample_motion_along_path
 from rsfstudy.responses import compute_settled_friction_flag, estimate_errors_at_instants

@@ -153,7 +153,7 @@ def plot_histogram(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     axes : matplotlib.axes.Axes
         Axes to draw on.
     """
-    from rsfstudy.plots.samples import draw_histogram
+    from rsfstudy.plots.corner_plots import draw_histogram
 
     draw_histogram("recurrence_interval", [], dataset, axes)
 

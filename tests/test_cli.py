@@ -15,7 +15,7 @@ import rsfstudy
 from rsfstudy.cli import assignment_parsing
 from rsfstudy.motion import engine_factory
 from rsfstudy.storage import dataset_files
-from rsfstudy.study import study_index, study_loader
+from rsfstudy.study import named_study_index, study_loader
 
 NAME = "rate_step_boundary"
 SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
@@ -182,7 +182,7 @@ def catalogued(monkeypatch):
 
     def named(*studies):
         by_name, load = {study.name: study for study in studies}, study_loader.load_study
-        replace_everywhere(monkeypatch, study_index.list_study_names, lambda: tuple(by_name))
+        replace_everywhere(monkeypatch, named_study_index.list_study_names, lambda: tuple(by_name))
         replace_everywhere(monkeypatch, load, lambda name: by_name.get(name) or load(name))
 
     return named

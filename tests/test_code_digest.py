@@ -23,8 +23,8 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.reductions import Reduction
 from rsfstudy.status import Status
-from rsfstudy.study import study_index, study_loader
-from rsfstudy.study.study_index import NAMED_STUDIES_PACKAGE
+from rsfstudy.study import named_study_index, study_loader
+from rsfstudy.study.named_study_index import NAMED_STUDIES_PACKAGE
 
 HELPER = """
 import functools
@@ -248,7 +248,7 @@ def physics_of(study):
 
 def with_measures_of_their_own():
     """Return the modules of named studies that define their own measure."""
-    loaded = [study_loader.load_study(name) for name in study_index.list_study_names()]
+    loaded = [study_loader.load_study(name) for name in named_study_index.list_study_names()]
     homes = {study.name: type(study.measure).__module__ for study in loaded}
     return [
         sys.modules[home]

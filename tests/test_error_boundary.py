@@ -296,7 +296,7 @@ def test_warnings_are_spelt_out():
 
 def test_headings_of_the_terminal_are_spelt_out(dataset, tmp_path, capsys):
     from rsfstudy.cli.table_layout import print_table_or_sentence
-    from rsfstudy.reporting.tables import TextTable
+    from rsfstudy.reporting.text_tables import TextTable
 
     rows = [{f"zeta ({ESCAPE})": "1", "why": "x" * 60}]
     print_table_or_sentence(TextTable(rows, caption=ESCAPE, wrappable_columns={"why"}))

@@ -15,7 +15,7 @@ from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS, STEP_UP
 
 import rsfstudy
 from rsfstudy.reductions import Range, apply_reductions
-from rsfstudy.reporting import fit_summaries, fit_tables, summaries
+from rsfstudy.reporting import dataset_summaries, fit_summaries, fit_tables
 from rsfstudy.status import Status
 
 
@@ -56,7 +56,7 @@ def test_tables_mark_standard_errors_that_are_not_valid() -> None:
     assert fit_summaries.format_parameter_with_stderr(naive().squeeze(), "a").endswith("*")
     texts = [
         piece
-        for piece in summaries.build_summary_tables_and_sentences(naive())
+        for piece in dataset_summaries.build_summary_tables_and_sentences(naive())
         if isinstance(piece, str)
     ]
     assert any("standard errors marked by * are not valid" in text for text in texts)

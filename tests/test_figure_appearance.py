@@ -16,7 +16,7 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import LinearStability
-from rsfstudy.plots import fits, samples
+from rsfstudy.plots import corner_plots, fits
 from rsfstudy.status import Status
 from rsfstudy.storage import write_dataset
 
@@ -231,18 +231,18 @@ def test_samples_are_a_corner_plot():
         same_column = [other for other, at in zip(drawn.axes, rows, strict=True) if at[1] == column]
         assert {other.get_xlim() for other in same_column} == {axes.get_xlim()}
     checks.assert_printable(drawn)
-    assert isinstance(samples.build_corner_figure(dataset), samples.CornerFigure)
+    assert isinstance(corner_plots.build_corner_figure(dataset), corner_plots.CornerFigure)
 
 
 def test_a_field_of_a_corner_plot_is_drawn_once_with_its_symbol():
     normal = np.random.default_rng(1).normal
     table = {"a": 0.01 + 1e-3 * normal(size=40), "b_over_a": 2.0 + 0.1 * normal(size=40)}
     dataset = lattice(Axis.cases(table, dimension="sample"))
-    assert samples.build_corner_figure(dataset, "a").columns == 2
+    assert corner_plots.build_corner_figure(dataset, "a").columns == 2
     lengths = xr.Dataset(
         {"slip_distance": ((), 12.0, {"long_name": "characteristic slip distance", "units": "um"})}
     )
-    assert samples._format_short_axis_label(lengths, "slip_distance") == r"$D_c$ ($\mu$m)"
+    assert corner_plots._format_short_axis_label(lengths, "slip_distance") == r"$D_c$ ($\mu$m)"
 
 
 def test_the_figure_of_overlapping_windows():
@@ -284,7 +284,7 @@ def test_posterior_draws_are_a_corner_plot():
         },
         {"parameter": ["a", "slip_distance"], "draw": np.arange(30)},
     )
-    figure, drawn = samples.posterior_figure(dataset)
+    figure, drawn = corner_plots.posterior_figure(dataset)
     assert figure.subplot_positions == [0, 2, 3]
     assert figure.panels[1].y_label == r"$D_c$ ($\mu$m)"
     assert np.array_equal(drawn.slip_distance, dataset.posterior[:, 1])

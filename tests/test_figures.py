@@ -26,7 +26,7 @@ from rsfstudy.plots import _style, _text
 from rsfstudy.quantities import Quantity
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.storage import dataset_files
-from rsfstudy.study import study_index
+from rsfstudy.study import named_study_index
 
 MM = 25.4
 #: Permitted apparent overlap in inches. Text extents use the height of the tallest letters,
@@ -35,7 +35,7 @@ MM = 25.4
 SLACK = 0.015
 
 
-@pytest.fixture(scope="module", params=study_index.list_study_names())
+@pytest.fixture(scope="module", params=named_study_index.list_study_names())
 def figure(request, tmp_path_factory):
     """Draw the figure of each reduced named study."""
     dataset, _path = named_results(request.param, tmp_path_factory)

@@ -23,10 +23,10 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.execution.provenance import read_git_commit_and_state
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
-from rsfstudy.storage import dataset_files, declarations, rebuild_from_file, schema
-from rsfstudy.storage.cell_columns import CellOutputPacker
+from rsfstudy.storage import dataset_files, schema, stored_declarations, study_reconstruction
 from rsfstudy.storage.cell_journal import CellJournal
-from rsfstudy.study import study_index, study_loader
+from rsfstudy.storage.cell_result_arrays import CellOutputPacker
+from rsfstudy.study import named_study_index, study_loader
 
 
 def dataset(value=1.0) -> xr.Dataset:
@@ -259,12 +259,12 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
 
 
 # ---- from the file alone ------------------------------------------------------------------------
-@pytest.mark.parametrize("name", study_index.list_study_names())
+@pytest.mark.parametrize("name", named_study_index.list_study_names())
 def test_every_declaration_restores_its_study(name):
     study = study_loader.load_study(name)
     described = json.loads(json.dumps(study.describe()))
-    restored = rebuild_from_file.build_study_from_declaration(
-        declarations.parse_study_declaration(described), study.user_parts
+    restored = study_reconstruction.build_study_from_declaration(
+        stored_declarations.parse_study_declaration(described), study.user_parts
     )
     assert json.loads(json.dumps(restored.describe())) == described
     assert restored.size == study.size
@@ -292,7 +292,7 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
     )
     assert ran.stdout == "EffectCost RelativeDifference\nCoverage CoverageStatistics\n"
     with pytest.raises(InvalidValue, match="Did you mean 'effect_cost'"):
-        declarations.build_measure({"name": "effect_costs"}, "")
+        stored_declarations.build_measure({"name": "effect_costs"}, "")
 
 
 def test_a_rerun_reproduces_every_number(small):

@@ -11,11 +11,11 @@ from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS
 
 import rsfstudy
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaged_noise_correlation import (
+from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, Filter
+from rsfstudy.fitting.noise_correlation_from_averaging import (
     NoiseCorrelationFromAveraging,
     apply_running_mean,
 )
-from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, Filter
 from rsfstudy.status import Status
 
 LOADING = ((0.0, 1.0), (40.07, 10.0))

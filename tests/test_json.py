@@ -26,7 +26,7 @@ from study_runs import call_main, run_with_failures
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.cli import commands, results, study_results
+from rsfstudy.cli import command_results, commands, study_results
 from rsfstudy.cli.command_group import CommandGroup
 from rsfstudy.cli.command_line import cli
 from rsfstudy.referee.problem_files import find_shipped_problem_files
@@ -418,8 +418,8 @@ def test_wrong_usage_prints_no_object(words):
 def test_values_without_a_json_form():
     given = {1: math.nan, "b": np.array([1.0, np.inf]), "c": np.int8(3), "d": Path("x/y"), "e": ()}
     expected = {"1": None, "b": [1.0, None], "c": 3, "d": str(Path("x/y")), "e": []}
-    assert results.to_json_value(given) == expected
-    assert results.to_json_value([True, None, np.bool_(False)]) == [True, None, False]
+    assert command_results.to_json_value(given) == expected
+    assert command_results.to_json_value([True, None, np.bool_(False)]) == [True, None, False]
 
 
 def test_the_example_of_the_page_runs(tmp_path):
@@ -443,7 +443,7 @@ def test_the_example_of_the_page_runs(tmp_path):
 
 
 def test_every_module_of_a_command_is_in_the_table():
-    folder = Path(results.__file__).parent / "commands"
+    folder = Path(command_results.__file__).parent / "commands"
     modules = {file.stem for file in folder.glob("[!_]*.py")}
     assert set(commands.MODULE_BY_COMMAND.values()) == modules
     assert list(cli.commands) == list(commands.MODULE_BY_COMMAND)

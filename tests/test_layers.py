@@ -15,7 +15,7 @@ import rsfstudy
 from rsfstudy import slider
 from rsfstudy.cli.commands import MODULE_BY_COMMAND
 from rsfstudy.execution import cell_computation
-from rsfstudy.study import study_index, study_loader
+from rsfstudy.study import named_study_index, study_loader
 
 ROOT = Path(rsfstudy.__file__).parent
 
@@ -185,7 +185,7 @@ def test_studies_load_nothing_that_draws():
 
 def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_path):
     """A worker receives the measure of a study, but no plots or reductions."""
-    for name in study_index.list_study_names():
+    for name in named_study_index.list_study_names():
         study = study_loader.load_study(name)
         task = cell_computation.SharedCellSettings(study.base, study.measure, study.accuracy)
         (tmp_path / name).write_bytes(cell_computation.serialize_cell_settings(task))
@@ -197,7 +197,7 @@ def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_pa
         f"print(*{heavy} & set(sys.modules))"
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    assert ran.stdout.split("\n") == [str(len(study_index.list_study_names())), "", ""]
+    assert ran.stdout.split("\n") == [str(len(named_study_index.list_study_names())), "", ""]
 
 
 HEAVY = (

@@ -28,7 +28,7 @@ from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
 from rsfstudy.execution.cell_plan import CellPlan
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
-from rsfstudy.storage import rebuild_from_file, schema
+from rsfstudy.storage import schema, study_reconstruction
 
 BOTH = study_of(
     "both",
@@ -187,7 +187,7 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
 def test_the_file_alone_reproduces_its_cells(tmp_path):
     found = run(BOTH, output=tmp_path).sel(direction="down", b_over_a=3.0)
     file = tmp_path / "both.nc"
-    restored = rebuild_from_file.build_study_from_declaration(
+    restored = study_reconstruction.build_study_from_declaration(
         schema.read_study_declaration(rsfstudy.open(file)), {}
     )
     assert restored.describe() == BOTH.describe()

@@ -11,7 +11,7 @@ from rsfstudy.motion.events import maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
 from rsfstudy.motion.recording import REGIME_COLUMN, Recording
-from rsfstudy.responses._motion_readings import compute_growth_rate_along_path
+from rsfstudy.responses._motion_quantities import compute_growth_rate_along_path
 from rsfstudy.responses.healing import Healing
 from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider.equations import RUPTURE_REGIME

@@ -20,9 +20,9 @@ from rsfstudy.former_data_names import rename_former_variables
 from rsfstudy.reporting.fit_tables import FitTable
 from rsfstudy.status import Status
 from rsfstudy.storage import schema
-from rsfstudy.storage.declarations import parse_study_declaration
+from rsfstudy.storage.stored_declarations import parse_study_declaration
 from rsfstudy.study import study_loader
-from rsfstudy.study.verdict_table import ClaimVerdictTable
+from rsfstudy.study.claim_verdict_table import ClaimVerdictTable
 
 #: Files written by rsfstudy 0.1.0, before files contained a layout number: a study with its
 #: journal and as a Zarr store, a named study narrowed with --set, a study with failed cells, and

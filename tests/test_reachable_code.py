@@ -20,7 +20,7 @@ from rsfstudy.execution.cell_plan import compute_cell_key
 from rsfstudy.execution.module_graph import ModuleImportGraph
 from rsfstudy.measures import CriticalStep, Elasticities, LimitCycle, LinearStability
 from rsfstudy.slider import part_registry
-from rsfstudy.storage import declarations, fingerprints
+from rsfstudy.storage import fingerprints, stored_declarations
 
 PACKAGE = Path(rsfstudy.__file__).parent
 SOURCES = provenance.read_physics_source_files(PACKAGE)
@@ -270,5 +270,5 @@ def test_a_later_slot_does_not_change_the_keys_of_other_scenes(monkeypatch):
     assert dilatant.stored_fields()["fluid"] == "dilatant"
     assert compute_cell_key(scene, LimitCycle()) != compute_cell_key(dilatant, LimitCycle())
     for each in (scene, dilatant):
-        assert declarations.build_scene_from_stored_fields(each.stored_fields()) == each
+        assert stored_declarations.build_scene_from_stored_fields(each.stored_fields()) == each
     assert dilatant.with_(fluid="drained") == scene

@@ -26,7 +26,7 @@ from rsfstudy.errors import CallError, DataError, InvalidValue
 from rsfstudy.rig import readers
 from rsfstudy.rig.columns import Column
 from rsfstudy.rig.readers import spreadsheets, text_layout
-from rsfstudy.rig.readers.source import SourceTable, TableSource
+from rsfstudy.rig.readers.table_sources import SourceTable, TableSource
 
 ROWS = 40
 TIME = 0.25 * np.arange(ROWS)

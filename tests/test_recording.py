@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import Event, EventKind
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.motion.recorded_motion_readings import resample_motion_along_path
+from rsfstudy.motion.motion_resampling import resample_motion_along_path
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, Recording
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status

@@ -12,7 +12,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import EventKind, maximum, minimum
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.responses._motion_readings import choose_friction_quantity_for_events
+from rsfstudy.responses._motion_quantities import choose_friction_quantity_for_events
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import stability
 from rsfstudy.slider.friction import build_friction_relation

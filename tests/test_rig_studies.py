@@ -13,9 +13,9 @@ import rsfstudy
 from rsfstudy import Axis, Rig, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import SLIP_MODE_NAMES, LimitCycle
-from rsfstudy.reporting import summaries
+from rsfstudy.reporting import dataset_summaries
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.study import studies_on_rig, study_loader
+from rsfstudy.study import conversion_to_rig_units, study_loader
 
 STATED = {
     "normal_stress": "5 MPa",
@@ -282,7 +282,7 @@ def test_results_say_what_they_are_of(cycles):
 
     Quantities that vary along an axis are omitted.
     """
-    of = summaries.describe_dataset_origin(cycles)
+    of = dataset_summaries.describe_dataset_origin(cycles)
     assert {"a = 0.01", "b_over_a = 1.4"} <= set(of["fixed fields"].split(", "))
     # In units of the slider, the stiffness depends on D_c and sigma_*.
     assert not {"stiffness", "load_velocity_ratio"} & set(
@@ -292,11 +292,11 @@ def test_results_say_what_they_are_of(cycles):
     assert "slip_distance" not in of["laboratory"]
     scene = RIG.scene(**LAW, hold_time="10 s")
     motion = RIG.in_units(rsfstudy.simulate(scene, duration=1.0))
-    assert summaries.describe_dataset_origin(motion)["laboratory"] == (
+    assert dataset_summaries.describe_dataset_origin(motion)["laboratory"] == (
         "normal_stress = 5 MPa, slip_distance = 10 um, reference_velocity = 1 um/s, "
         "stiffness = 0.01 MPa/um"
     )
-    assert "hold_time = 1" in summaries.describe_dataset_origin(motion)["scene"].split(", ")
+    assert "hold_time = 1" in dataset_summaries.describe_dataset_origin(motion)["scene"].split(", ")
 
 
 # ---- the command line ----------------------------------------------------------------------------
@@ -314,7 +314,7 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     """
     studied = study_loader.load_study("slide_hold_slide")
     rig = Rig(**{n: v for n, v in STATED.items() if n != "stiffness"})
-    there = studies_on_rig.convert_study_to_rig_units(studied, rig)
+    there = conversion_to_rig_units.convert_study_to_rig_units(studied, rig)
     assert [axis.units for axis in there.axes[1:]] == [{"stiffness": "MPa/um"}, {"hold_time": "s"}]
     # The range of the fit is unchanged, because D_c/V_* is 10 s.
     assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
@@ -345,6 +345,6 @@ def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
     study = study_loader.load_study("limit_cycles")
     damped = replace(study, base=study.base.with_(inertia=False, radiation_damping=1e-4))
     for before, rig, mass in ((study, radiates, False), (damped, swings, True)):
-        there = studies_on_rig.convert_study_to_rig_units(before, rig).base
+        there = conversion_to_rig_units.convert_study_to_rig_units(before, rig).base
         assert there.has_mass is mass
         assert (there.radiation_damping == 0.0) is mass

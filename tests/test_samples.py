@@ -31,7 +31,7 @@ from rsfstudy.reductions import (
 )
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
-from rsfstudy.storage import rebuild_from_file
+from rsfstudy.storage import study_reconstruction
 from rsfstudy.study.reductions.unit_conversion import InUnits
 
 RECORDS = Path(uncertain_recurrence.__file__).parent / "records"
@@ -76,7 +76,7 @@ def test_fields_are_functions_of_what_is_drawn():
     how = json.loads(found["sample"].attrs["drawn"])
     assert (how["method"], how["n"], how["seed"]) == ("sobol", 8, 3)
     assert how["of"]["ln_a"].startswith("norm(")
-    again = rebuild_from_file.rebuild_study(found)
+    again = study_reconstruction.rebuild_study(found)
     assert again.axes[1].describe() == samples.describe()
     assert list(again.scenes()) == list(study(Axis("law", ["slip", "slowness"]), samples).scenes())
 
@@ -147,7 +147,7 @@ def test_the_rows_of_a_table_are_cases(table):
     found = run(study(Axis.cases(table)))
     assert found["case"].values.tolist() == [0, 1, 2]
     np.testing.assert_allclose(found["critical_stiffness"], [0.005, 0.0048, 0.005], rtol=1e-7)
-    assert rebuild_from_file.rebuild_study(found).axes[0].rows == Axis("case", TABLE).rows
+    assert study_reconstruction.rebuild_study(found).axes[0].rows == Axis("case", TABLE).rows
 
 
 def _with_units(tmp_path):
@@ -178,7 +178,7 @@ def test_a_table_in_units_of_a_rig(tmp_path):
         assert [scene.a for scene in scenes] == [0.01, 0.012]
         found = run(declared)
         assert found["slip_distance"].attrs["units"] in ("um", "m")
-        assert rebuild_from_file.rebuild_study(found).describe() == declared.describe()
+        assert study_reconstruction.rebuild_study(found).describe() == declared.describe()
 
 
 # ---- from a fit ----------------------------------------------------------------------------------

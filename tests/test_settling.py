@@ -10,7 +10,7 @@ import pytest
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.measure_base.settling_checks import is_steady_sliding_linearly_stable
+from rsfstudy.measure_base.steady_sliding_stability import is_steady_sliding_linearly_stable
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise

@@ -21,13 +21,13 @@ from rsfstudy.errors import IncompleteWarning
 from rsfstudy.quantities import HtmlMarkup, format_symbol_as_html
 from rsfstudy.reductions import SobolIndices
 from rsfstudy.reporting import lattice_tables
-from rsfstudy.reporting.tables import build_single_scene_result_table, format_rounded_to_error
+from rsfstudy.reporting.text_tables import build_single_scene_result_table, format_rounded_to_error
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
-from rsfstudy.storage import dataset_files, rebuild_from_file
+from rsfstudy.storage import dataset_files, study_reconstruction
 from rsfstudy.study import study_loader
+from rsfstudy.study.claim_verdict_table import ClaimVerdictTable
 from rsfstudy.study.claims import Claim, build_verdict_table
-from rsfstudy.study.verdict_table import ClaimVerdictTable
 
 
 def rows(html):
@@ -122,7 +122,7 @@ def test_the_accessor_shows_numbers_and_verdicts():
     assert ["id", "claim", "published", "computed", "tolerance and reason", "verdict"] in shown
     values = {
         f"{value:.8g}"
-        for value in done[rebuild_from_file.find_primary_output_name(done)].values.flat
+        for value in done[study_reconstruction.find_primary_output_name(done)].values.flat
     }
     assert len([row for row in shown if values & set(row)]) > 10
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")

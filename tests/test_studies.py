@@ -21,12 +21,12 @@ from study_runs import named_results, reduced_study
 import rsfstudy
 from rsfstudy import plots
 from rsfstudy.status import Status
-from rsfstudy.study import study_index, study_loader
+from rsfstudy.study import named_study_index, study_loader
 
 FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
 
 
-@pytest.fixture(scope="module", params=study_index.list_study_names())
+@pytest.fixture(scope="module", params=named_study_index.list_study_names())
 def result(request, tmp_path_factory):
     """Return the results of a reduced study, and the path of its file."""
     return named_results(request.param, tmp_path_factory)
@@ -239,7 +239,7 @@ def test_what_is_reduced_carries_the_errors_of_its_cells(result):
 
 
 @pytest.mark.parametrize(
-    "result", study_index.list_study_names()[::7], indirect=True, scope="module"
+    "result", named_study_index.list_study_names()[::7], indirect=True, scope="module"
 )
 def test_the_plain_plot_draws_any_lattice(result):
     foreign = json.loads(result[0].attrs["declaration"])

@@ -17,8 +17,8 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import number
-from rsfstudy.storage import rebuild_from_file
-from rsfstudy.study import study_index, study_loader
+from rsfstudy.storage import study_reconstruction
+from rsfstudy.study import named_study_index, study_loader
 
 CASES = {
     "constant": {"normal_stress": "constant"},
@@ -120,7 +120,7 @@ def test_coordinates_are_taken_from_the_scenes_of_the_plan(monkeypatch, tmp_path
     monkeypatch.setattr(Study, "cell", None)
     rsfstudy.run(study, output=tmp_path, workers=0, progress=False)
     found = rsfstudy.open(tmp_path / "trial.nc")
-    assert rebuild_from_file.rebuild_study(found).describe() == study.describe()
+    assert study_reconstruction.rebuild_study(found).describe() == study.describe()
     assert found.normal_stress.values.tolist() == ["variable", "constant"]
     assert found.alpha.values.tolist() == pytest.approx([0.25, np.nan], nan_ok=True)
     assert (found.b_over_a.dims, found.law.item()) == (("b_over_a",), "slip")
@@ -236,7 +236,7 @@ MIXED = Study(
 )
 
 
-@pytest.mark.parametrize("name", ["mixed", *study_index.list_study_names()])
+@pytest.mark.parametrize("name", ["mixed", *named_study_index.list_study_names()])
 def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     """A worker reconstructs each cell from its key and its changes.
 

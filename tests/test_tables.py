@@ -18,14 +18,14 @@ from rsfstudy.formatting import format_overrides
 from rsfstudy.measures import Outcome
 from rsfstudy.reporting import (
     cell_tables,
+    json_summaries,
     lattice_tables,
-    machine_readable,
     reduction_tables,
     verdict_tables,
 )
-from rsfstudy.reporting.tables import TextTable
+from rsfstudy.reporting.text_tables import TextTable
 from rsfstudy.status import Status
-from rsfstudy.study import study_index, study_loader
+from rsfstudy.study import named_study_index, study_loader
 
 WIDTHS = (40, 80)
 
@@ -65,13 +65,13 @@ def in_one_piece(piece: str, lines: list[str]) -> bool:
     return any(f" {piece} " in f" {line} " for line in lines)
 
 
-@pytest.mark.parametrize("name", study_index.list_study_names())
+@pytest.mark.parametrize("name", named_study_index.list_study_names())
 def test_results_of_every_study(name, printed, tmp_path_factory):
     dataset, _path = named_results(name, tmp_path_factory)
     shown = [
         lattice_tables.build_primary_output_table(dataset),
         *reduction_tables.build_reduction_tables(dataset),
-        machine_readable.build_result_variables_table(dataset),
+        json_summaries.build_result_variables_table(dataset),
     ]
     shown += [verdict_tables.build_claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):
@@ -83,7 +83,7 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
 @pytest.mark.parametrize("width", WIDTHS)
 def test_declarations_of_every_study(width, printed, tmp_path):
     """The points of all axes are printed in one piece."""
-    for name in study_index.list_study_names():
+    for name in named_study_index.list_study_names():
         study = study_loader.load_study(name)
         declared = study_declarations.StudyDeclaration(study, tmp_path)
         lines = printed(width, study_declarations.print_study_declaration, declared)

@@ -10,7 +10,7 @@ from study_runs import run
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.api import progress
 from rsfstudy.execution.cell_plan import order_cells_by_golden_section
-from rsfstudy.execution.time_estimate import RemainingTimeEstimator
+from rsfstudy.execution.remaining_time_estimate import RemainingTimeEstimator
 from rsfstudy.measures import LinearStability
 
 Y, X = np.meshgrid(np.linspace(0.0, 1.0, 200), np.linspace(0.0, 1.0, 200), indexing="ij")

@@ -44,7 +44,7 @@ from rsfstudy.slider.parts import CONDITION_BY_VALUE_RULE, is_boolean_field, lis
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim
-from rsfstudy.study.study_index import list_study_names
+from rsfstudy.study.named_study_index import list_study_names
 
 WORDINGS = Path(__file__).with_name("wordings.txt")
 

@@ -186,7 +186,7 @@ class DatasetAccessor:
         >>> converted["shear_stress"].attrs["units"]
         'Pa'
         """
-        from rsfstudy.api.single_scene import to_si
+        from rsfstudy.api.single_scene_measures import to_si
 
         self._require_rsfstudy_dataset()
         return to_si(self._dataset, **scale_values)
@@ -469,7 +469,7 @@ class DatasetAccessor:
         >>> list(motion.coords), motion["slip"].attrs["units"]
         (['time', 'slip'], 'D_c')
         """
-        from rsfstudy.api.simple_datasets import omit_constants_and_simplify_units
+        from rsfstudy.api.dataset_simplification import omit_constants_and_simplify_units
 
         self._require_rsfstudy_dataset()
         return omit_constants_and_simplify_units(self._dataset)

@@ -13,7 +13,7 @@ import warnings
 import click
 
 from rsfstudy.cli.command_group import CommandGroup
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
+from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.error_boundary import format_exception
 from rsfstudy.errors import (
     IncompleteWarning,

@@ -8,8 +8,8 @@ from typing import Any
 
 import xarray as xr
 
+from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult
 from rsfstudy.cli.study_results import StudyResults, print_failed_cells
 from rsfstudy.reporting import (
     are_all_fits_valid,

@@ -10,8 +10,8 @@ from typing import Any
 
 from rsfstudy import Study
 from rsfstudy.cli import cost_estimates
+from rsfstudy.cli.command_results import EXIT_STATUS_OK, CommandResult
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult
 from rsfstudy.execution import CellPlan
 from rsfstudy.formatting import format_count_with_noun
 from rsfstudy.reporting import describe_scene_and_rig_fields

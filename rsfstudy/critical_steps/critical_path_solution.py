@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.shooting_steps import (
+from rsfstudy.critical_steps.loading_step_families import (
     LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT,
     LoadingStepFamily,
 )

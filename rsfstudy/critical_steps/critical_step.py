@@ -33,13 +33,13 @@ from rsfstudy.critical_steps.loading_checks import (
     build_slow_instability_norm_warning,
     check_loading_is_single_step,
 )
-from rsfstudy.critical_steps.shooting_steps import LoadingStepFamily
-from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
-from rsfstudy.critical_steps.step_types import (
+from rsfstudy.critical_steps.loading_step_families import LoadingStepFamily
+from rsfstudy.critical_steps.loading_step_types import (
     DisplacementStepFamily,
     LoadVelocityStepFamily,
     NormalStressStepFamily,
 )
+from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome

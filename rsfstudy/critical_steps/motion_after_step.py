@@ -10,10 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.held_load_point import compute_peak_log_rate_excess_over_norm
 from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
     build_events_testing_monotone_rise,
     rises_monotonically_to_load_rate,
+)
+from rsfstudy.critical_steps.motion_with_held_load_point import (
+    compute_peak_log_rate_excess_over_norm,
 )
 from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
 from rsfstudy.critical_steps.stability_after_step import (

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
         CellPlan,
     )
     from rsfstudy.execution.clusters import connect_to_cluster
-    from rsfstudy.execution.preparation import prepare_study_run
     from rsfstudy.execution.provenance import build_provenance_attributes, collect_run_fingerprint
     from rsfstudy.execution.study_run import OutputOptions, ProgressCallback
+    from rsfstudy.execution.study_run_preparation import prepare_study_run
     from rsfstudy.execution.worker_pool import WorkerPool
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -28,7 +28,7 @@ else:
         {
             "execution.clusters": ("connect_to_cluster",),
             "execution.cell_plan": ("CellPlan",),
-            "execution.preparation": ("prepare_study_run",),
+            "execution.study_run_preparation": ("prepare_study_run",),
             "execution.provenance": ("provenance_attributes", "run_fingerprint"),
             "execution.study_run": ("OutputOptions", "ProgressCallback"),
             "execution.worker_pool": ("WorkerPool",),

@@ -20,7 +20,7 @@ from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError,
 from rsfstudy.execution import provenance
 from rsfstudy.execution.cell_computation import CellBatchMapper, SharedCellSettings, StoredCellRows
 from rsfstudy.execution.cell_plan import CellBatchIterator, CellPlan, order_cells_by_golden_section
-from rsfstudy.execution.time_estimate import RemainingTimeEstimator
+from rsfstudy.execution.remaining_time_estimate import RemainingTimeEstimator
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.status import Status
 from rsfstudy.storage import (

@@ -12,7 +12,7 @@ from typing import Any
 
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import RunError
-from rsfstudy.explorer.views import create_view
+from rsfstudy.explorer.view_creation import create_view
 
 
 @error_boundary

@@ -15,12 +15,12 @@ import xarray as xr
 
 from rsfstudy.api import fit
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.explorer.base_view import ExplorerView
+from rsfstudy.explorer.error_messages import escape_markdown
+from rsfstudy.explorer.fit_choice_widgets import create_fit_choice_widgets, describe_loading_step
 from rsfstudy.explorer.fit_choices import FitChoices, format_fit_command
-from rsfstudy.explorer.messages import escape_markdown
 from rsfstudy.explorer.record_plot import RecordPlot
-from rsfstudy.explorer.record_widgets import create_fit_choice_widgets, describe_loading_step
 from rsfstudy.explorer.scene_settings import format_python_call, format_values_as_python_code
-from rsfstudy.explorer.view import ExplorerView
 from rsfstudy.fitting import Record
 from rsfstudy.plots import Figure
 from rsfstudy.reporting import (

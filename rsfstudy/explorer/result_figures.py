@@ -24,7 +24,7 @@ from bokeh.models import (
 )
 from bokeh.plotting import figure
 
-from rsfstudy.explorer.result_arrays import (
+from rsfstudy.explorer.curve_and_map_data import (
     CurveData,
     MapData,
     StatusMarks,
@@ -37,7 +37,8 @@ from rsfstudy.explorer.result_arrays import (
     format_status_name,
     sample_map_at_pixels,
 )
-from rsfstudy.explorer.result_scales import (
+from rsfstudy.explorer.plot_selections import PlotSelection
+from rsfstudy.explorer.result_colours_and_ticks import (
     build_colour_mapper_of_dimension,
     build_colour_mapper_of_map,
     build_ticker_and_labels,
@@ -47,7 +48,6 @@ from rsfstudy.explorer.result_scales import (
     is_log_spaced_coordinate,
     set_tick_labels,
 )
-from rsfstudy.explorer.result_selections import PlotSelection
 from rsfstudy.plots import (
     are_log_spaced,
     are_positive_and_span_decades,

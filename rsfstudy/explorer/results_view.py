@@ -13,27 +13,22 @@ import panel as pn
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.explorer.result_arrays import (
-    convert_mathtext_to_unicode,
-    describe_selected_points,
-    format_status_name,
-    iterate_panel_selections,
-    list_shown_variable_names,
-)
-from rsfstudy.explorer.result_cells import (
+from rsfstudy.explorer.base_view import ExplorerView
+from rsfstudy.explorer.cell_recomputation import (
     RecomputedCell,
     draw_motion_figures,
     find_cell_coordinates,
     recompute_cell_and_motion,
     tabulate_recomputed_outcome,
 )
-from rsfstudy.explorer.result_code import (
-    draw_figure_of_selection,
-    write_selection_as_python_code,
-    write_selection_as_shell_commands,
+from rsfstudy.explorer.curve_and_map_data import (
+    convert_mathtext_to_unicode,
+    describe_selected_points,
+    format_status_name,
+    iterate_panel_selections,
+    list_shown_variable_names,
 )
-from rsfstudy.explorer.result_figures import CurvesPlot, MapPlot, ResultPlot
-from rsfstudy.explorer.result_selections import (
+from rsfstudy.explorer.plot_selections import (
     LINES,
     MAP,
     PlotSelection,
@@ -43,7 +38,12 @@ from rsfstudy.explorer.result_selections import (
     list_plottable_variables,
     list_x_axis_choices,
 )
-from rsfstudy.explorer.view import ExplorerView
+from rsfstudy.explorer.reproduction_code import (
+    draw_figure_of_selection,
+    write_selection_as_python_code,
+    write_selection_as_shell_commands,
+)
+from rsfstudy.explorer.result_figures import CurvesPlot, MapPlot, ResultPlot
 from rsfstudy.formatting import format_nonempty_fields
 from rsfstudy.plots import Figure, draw_figure, render_figure
 from rsfstudy.reporting import build_failed_cells_table, count_cells_by_status

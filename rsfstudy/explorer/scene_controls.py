@@ -8,7 +8,7 @@ from typing import Any
 
 import panel as pn
 
-from rsfstudy.explorer.field_widgets import POSITIVE, NumberWidget, SliderRange
+from rsfstudy.explorer.number_widgets import POSITIVE, NumberWidget, SliderRange
 from rsfstudy.explorer.scene_settings import (
     DISPLAY_UNITS_BY_SCALE,
     PROTOCOL_LOADING_NAME,

@@ -16,12 +16,12 @@ from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure as bokeh_figure
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.explorer.jobs import ReportProgressFunction
-from rsfstudy.explorer.messages import escape_markdown
+from rsfstudy.explorer.background_jobs import ReportProgressFunction
+from rsfstudy.explorer.base_view import ExplorerView
+from rsfstudy.explorer.error_messages import escape_markdown
 from rsfstudy.explorer.scene_controls import SceneControls
 from rsfstudy.explorer.scene_presets import SETTINGS_BY_PRESET_LABEL
 from rsfstudy.explorer.scene_settings import SceneSettings
-from rsfstudy.explorer.view import ExplorerView
 from rsfstudy.plots import Figure, plot_motion
 from rsfstudy.reporting import TextTable, build_motion_tables_and_sentences
 from rsfstudy.rig import DatasetUnits, Rig

@@ -23,10 +23,10 @@ from tornado.routing import Matcher, Rule
 from tornado.web import RequestHandler
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.explorer.jobs import redirect_warnings_to_browser_page
-from rsfstudy.explorer.messages import create_error_page
-from rsfstudy.explorer.view import URL_ARGUMENT_OF_WIDGET_STATE, load_panel_extension
-from rsfstudy.explorer.views import create_view
+from rsfstudy.explorer.background_jobs import redirect_warnings_to_browser_page
+from rsfstudy.explorer.base_view import URL_ARGUMENT_OF_WIDGET_STATE, load_panel_extension
+from rsfstudy.explorer.error_messages import create_error_page
+from rsfstudy.explorer.view_creation import create_view
 
 #: Address of the loopback interface, and port that is used by default if it is free.
 HOST, DEFAULT_PORT = "127.0.0.1", 8067

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.fitting.drop_detection import MIN_SAMPLES, Detection
-    from rsfstudy.fitting.drop_measurements import read_drops
+    from rsfstudy.fitting.fault_slip_check import displacement_is_slip
     from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, MEAN, TRAILING_MEAN, Filter
     from rsfstudy.fitting.fit_measure import Fit
     from rsfstudy.fitting.fit_validity_checks import describe_whiteness
@@ -22,10 +21,11 @@ if TYPE_CHECKING:
     from rsfstudy.fitting.hold_table import build_hold_table
     from rsfstudy.fitting.holds import MAX_HOLD_OVER_SLIDING_VELOCITY
     from rsfstudy.fitting.joint_model import fitted_fields, split_window_number, strip_window_number
-    from rsfstudy.fitting.load_point_check import displacement_is_slip
     from rsfstudy.fitting.local_regression import compute_weighted_mean
     from rsfstudy.fitting.record import RECORD_COLUMNS, Record
-    from rsfstudy.fitting.stress_drop_fits import EVENT_QUANTITIES, EventNumbers
+    from rsfstudy.fitting.stress_drop_detection import MIN_SAMPLES, Detection
+    from rsfstudy.fitting.stress_drop_measurements import read_drops
+    from rsfstudy.fitting.stress_drop_search import EVENT_QUANTITIES, EventNumbers
     from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
     from rsfstudy.fitting.window_model import (
         LOGARITHMIC_PARAMETERS,
@@ -38,8 +38,8 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "fitting.drop_detection": ("Detection", "MIN_SAMPLES"),
-            "fitting.drop_measurements": ("read_drops",),
+            "fitting.stress_drop_detection": ("Detection", "MIN_SAMPLES"),
+            "fitting.stress_drop_measurements": ("read_drops",),
             "fitting.filters": (
                 "FILTER_KINDS",
                 "Filter",
@@ -51,10 +51,10 @@ else:
             "fitting.hold_table": ("build_hold_table",),
             "fitting.holds": ("MAX_HOLD_OVER_SLIDING_VELOCITY",),
             "fitting.joint_model": ("fitted_fields", "split_window_number", "strip_window_number"),
-            "fitting.load_point_check": ("displacement_is_slip",),
+            "fitting.fault_slip_check": ("displacement_is_slip",),
             "fitting.local_regression": ("compute_weighted_mean",),
             "fitting.record": ("RECORD_COLUMNS", "Record"),
-            "fitting.stress_drop_fits": ("EVENT_QUANTITIES", "EventNumbers"),
+            "fitting.stress_drop_search": ("EVENT_QUANTITIES", "EventNumbers"),
             "fitting.fit_validity_checks": ("describe_whiteness",),
             "fitting.velocity_steps": ("LoadingStep", "noise_variance"),
             "fitting.fit_window": ("FitWindow",),

@@ -15,12 +15,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from rsfstudy.fitting import noise as noises
-from rsfstudy.fitting.averaged_noise_correlation import (
+from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
+from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
+from rsfstudy.fitting.noise_correlation_from_averaging import (
     MAX_ROWS_PER_AVERAGING_TIME,
     apply_running_mean,
 )
-from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
-from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 
 #: Lengths of the tested running means in rows, and criteria for detecting a filter. The first
 #: criterion is the smallest decrease in the AIC due to the filter. The second criterion is the

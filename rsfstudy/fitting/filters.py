@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaged_noise_correlation import apply_running_mean
+from rsfstudy.fitting.noise_correlation_from_averaging import apply_running_mean
 
 #: Names of a running mean centred at each row, and of a running mean that ends at each row.
 MEAN, TRAILING_MEAN = "mean", "trailing_mean"

@@ -43,7 +43,7 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaged_noise_correlation import NoiseCorrelationFromAveraging
+from rsfstudy.fitting.noise_correlation_from_averaging import NoiseCorrelationFromAveraging
 from rsfstudy.fitting.uniform_sampling_runs import (
     SamplingRun,
     count_noise_processes,

@@ -18,7 +18,7 @@ from rsfstudy._deprecation import accept_former_keyword_names, add_former_member
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.holds import measure_holds
-from rsfstudy.fitting.stiffness_portions import measure_stiffness
+from rsfstudy.fitting.locked_portion_stiffness import measure_stiffness
 from rsfstudy.fitting.stress_steps import (
     find_normal_stress_steps,
     merge_normal_stress_and_velocity_steps,

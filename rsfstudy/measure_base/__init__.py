@@ -18,10 +18,13 @@ if TYPE_CHECKING:
         check_loading_changes_stress_only_in_steps,
         check_loading_has_no_noise,
     )
-    from rsfstudy.measure_base._recorded_motion import RecordingMeasure, create_outputs_along_phase
+    from rsfstudy.measure_base._recording_measure import (
+        RecordingMeasure,
+        create_outputs_along_phase,
+    )
     from rsfstudy.measure_base.elasticities import Elasticities
     from rsfstudy.measure_base.measure import Measure, Outcome
-    from rsfstudy.measure_base.settling_checks import is_steady_sliding_linearly_stable
+    from rsfstudy.measure_base.steady_sliding_stability import is_steady_sliding_linearly_stable
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -31,10 +34,10 @@ else:
                 "check_loading_changes_stress_only_in_steps",
                 "refuse_noise",
             ),
-            "measure_base._recorded_motion": ("RecordingMeasure", "create_outputs_along_phase"),
+            "measure_base._recording_measure": ("RecordingMeasure", "create_outputs_along_phase"),
             "measure_base.elasticities": ("Elasticities",),
             "measure_base.measure": ("Measure", "Outcome"),
-            "measure_base.settling_checks": ("steady_sliding_is_linearly_stable",),
+            "measure_base.steady_sliding_stability": ("steady_sliding_is_linearly_stable",),
         },
     )
 

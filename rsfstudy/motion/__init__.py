@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     )
     from rsfstudy.motion.integrator import Integrator
     from rsfstudy.motion.motion_driver import MotionDriver
-    from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
-    from rsfstudy.motion.recorded_motion_readings import (
+    from rsfstudy.motion.motion_resampling import (
         resample_motion_along_path,
     )
+    from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
     from rsfstudy.motion.recording import (
         Recording,
     )
@@ -77,7 +77,7 @@ else:
                 "WorkMeter",
             ),
             "motion.neglected_inertia_error": ("estimate_neglected_inertia_error",),
-            "motion.recorded_motion_readings": ("resample_motion_along_path",),
+            "motion.motion_resampling": ("resample_motion_along_path",),
             "motion.recording": ("Recording",),
             "motion.root_finding": ("build_root_finder",),
         },

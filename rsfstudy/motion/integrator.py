@@ -15,12 +15,7 @@ from collections.abc import Iterator, Sequence
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.motion import initial_points
 from rsfstudy.motion.accuracy import Accuracy, estimate_error
-from rsfstudy.motion.events import Event, EventKind, EventSpecification
-from rsfstudy.motion.initial_points import compute_initial_point, compute_point_after_loading_jump
-from rsfstudy.motion.motion_driver import MotionDriver, get_motion_driver
-from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.regime_switching import compute_regime_switch_thresholds, inertia_matters_at
-from rsfstudy.motion.segment_chains import (
+from rsfstudy.motion.continuous_segments import (
     drop_settling_events_if_unstable,
     find_segments_left_to_integrate,
     iterate_segment_start_events,
@@ -29,6 +24,11 @@ from rsfstudy.motion.segment_chains import (
     split_segments_at_stress_jumps,
     truncate_segment_table_at_time,
 )
+from rsfstudy.motion.events import Event, EventKind, EventSpecification
+from rsfstudy.motion.initial_points import compute_initial_point, compute_point_after_loading_jump
+from rsfstudy.motion.motion_driver import MotionDriver, get_motion_driver
+from rsfstudy.motion.recording import Recording
+from rsfstudy.motion.regime_switching import compute_regime_switch_thresholds, inertia_matters_at
 from rsfstudy.motion.work_meter import MIN_LOCAL_TOLERANCE, WorkMeter
 from rsfstudy.parts import (
     LOADING,

@@ -78,7 +78,6 @@ from rsfstudy.motion.regime_starts import (
     start_next_segment,
 )
 from rsfstudy.motion.regime_switching import CONTINUES, RegimeSwitchThresholds
-from rsfstudy.motion.step_conditions import may_any_event_be_reported_later
 from rsfstudy.motion.step_ends import (
     has_rupture_regime_ended,
     is_step_end_valid,
@@ -94,6 +93,7 @@ from rsfstudy.motion.step_integration import (
     halve_step_until_dense_output_is_accurate,
     take_step,
 )
+from rsfstudy.motion.step_root_conditions import may_any_event_be_reported_later
 from rsfstudy.motion.step_samples import (
     record_regime_start,
     record_step_samples,

@@ -18,18 +18,18 @@ from rsfstudy.motion.regime_switching import (
     is_slip_slow_enough_for_slow_manifold,
     should_switch_back_to_slow_manifold,
 )
-from rsfstudy.motion.step_conditions import (
-    SWITCH_CONDITION,
-    TERMINATION_CONDITION,
-    TIME_CONDITION,
-    compute_excess_over_switch_threshold,
-    locate_sign_change,
-)
 from rsfstudy.motion.step_integration import (
     compute_time_at_step_begin,
     compute_time_at_step_end,
     compute_time_since_regime_start,
     truncate_step_at,
+)
+from rsfstudy.motion.step_root_conditions import (
+    SWITCH_CONDITION,
+    TERMINATION_CONDITION,
+    TIME_CONDITION,
+    compute_excess_over_switch_threshold,
+    locate_sign_change,
 )
 from rsfstudy.motion.steppers import retake_step
 from rsfstudy.parts import LOAD_VELOCITY

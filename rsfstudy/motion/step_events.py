@@ -35,18 +35,18 @@ from rsfstudy.motion.array_layout import (
     STEADY_STATE_DISTANCE,
     STEADY_STATE_OFFSET,
 )
-from rsfstudy.motion.step_conditions import (
-    evaluate_event_function,
-    get_event_specification,
-    has_event_occurred,
-    locate_sign_change,
-)
 from rsfstudy.motion.step_integration import (
     compute_slip_since_motion_start,
     compute_time_at_step_begin,
     compute_time_at_step_end,
     compute_time_since_regime_start,
     evaluate_point_within_step,
+)
+from rsfstudy.motion.step_root_conditions import (
+    evaluate_event_function,
+    get_event_specification,
+    has_event_occurred,
+    locate_sign_change,
 )
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, B
 

@@ -24,7 +24,6 @@ from rsfstudy.motion.recording import (
     SAMPLE_NUMBER_COLUMN,
     SAMPLES_PER_STEP,
 )
-from rsfstudy.motion.step_conditions import TIME_CONDITION, locate_sign_change
 from rsfstudy.motion.step_integration import (
     compute_slip_since_motion_start,
     compute_time_at_step_begin,
@@ -32,6 +31,7 @@ from rsfstudy.motion.step_integration import (
     compute_time_since_regime_start,
     evaluate_point_within_step,
 )
+from rsfstudy.motion.step_root_conditions import TIME_CONDITION, locate_sign_change
 
 
 def record_regime_start(motion, workspace, recording_table):

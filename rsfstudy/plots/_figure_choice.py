@@ -57,9 +57,9 @@ def choose_figure(
     name, sizes = StoredDataset(dataset).declaration.plot, dataset["status"].sizes
     study = load_study(name) if name in list_study_names() else None
     if name == _NAME_OF_FITS_FIGURE and variable == "posterior" and variable in dataset:
-        from rsfstudy.plots import samples
+        from rsfstudy.plots import corner_plots
 
-        return samples.posterior_figure(dataset)
+        return corner_plots.posterior_figure(dataset)
     if name == _NAME_OF_FITS_FIGURE and user_figure is variable is None:
         return Declared(
             importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").panels(dataset)
@@ -146,11 +146,11 @@ def _build_generic_figure(dataset: xr.Dataset, variable: str | None = None) -> D
     The figure is a corner plot for studies with samples, a set of maps if there are two numeric
     axes, and a line plot otherwise.
     """
-    from rsfstudy.plots import _axes, lines, maps, samples
+    from rsfstudy.plots import _axes, corner_plots, lines, maps
 
     logarithms = [n for n in map(str, dataset.data_vars) if "log10_" in n]
     dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
-    if corner := samples.build_corner_figure(dataset, variable):
+    if corner := corner_plots.build_corner_figure(dataset, variable):
         return corner
     for module in (maps, lines):
         if found := module.panels(dataset, variable):

@@ -38,7 +38,7 @@ from rsfstudy.plots._text import (
     find_quantity_symbol_or_name,
     wrap_text,
 )
-from rsfstudy.plots.samples import CornerFigure
+from rsfstudy.plots.corner_plots import CornerFigure
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset

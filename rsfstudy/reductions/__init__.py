@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.study.reductions.application import apply_reductions
     from rsfstudy.study.reductions.base import Reduction
     from rsfstudy.study.reductions.boundaries import Boundary, Inverse
     from rsfstudy.study.reductions.comparisons import (
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
         RelativeDifference,
     )
     from rsfstudy.study.reductions.fits import LinearFit, PowerLaw, ProportionalFit, SemilogFit
+    from rsfstudy.study.reductions.reduction_application import apply_reductions
     from rsfstudy.study.reductions.sobol_indices import SobolIndices
     from rsfstudy.study.reductions.statistics import (
         Logarithm,
@@ -35,7 +35,7 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "study.reductions.application": ("apply_reductions",),
+            "study.reductions.reduction_application": ("apply_reductions",),
             "study.reductions.base": ("Reduction",),
             "study.reductions.boundaries": ("Boundary", "Inverse"),
             "study.reductions.comparisons": (

@@ -13,18 +13,21 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.referee.answer_comparison import AnswerComparison
-    from rsfstudy.referee.problem_files import write_shipped_problems
-    from rsfstudy.referee.verification import (
+    from rsfstudy.referee.answer_file_comparison import (
         compare_file_with_known_answer,
         summarise_answer_comparisons,
     )
+    from rsfstudy.referee.problem_files import write_shipped_problems
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "referee.answer_comparison": ("AnswerComparison",),
             "referee.problem_files": ("write_problems",),
-            "referee.verification": ("compare_file_with_known_answer", "summarise_comparisons"),
+            "referee.answer_file_comparison": (
+                "compare_file_with_known_answer",
+                "summarise_comparisons",
+            ),
         },
     )
 

@@ -19,6 +19,13 @@ if TYPE_CHECKING:
         format_notes_on_incomplete_results,
         format_status_counts,
     )
+    from rsfstudy.reporting.dataset_summaries import (
+        SummaryTableOrSentence,
+        build_motion_tables_and_sentences,
+        build_summary_tables_and_sentences,
+        describe_dataset_origin,
+        is_motion,
+    )
     from rsfstudy.reporting.event_tables import (
         build_record_events_tables_and_sentences,
         summarise_record_events_as_fields,
@@ -32,30 +39,23 @@ if TYPE_CHECKING:
         summarise_fits_as_fields,
     )
     from rsfstudy.reporting.hold_summaries import is_hold_table, summarise_holds
-    from rsfstudy.reporting.lattice_tables import (
-        summarise_study_as_text_lines,
-    )
-    from rsfstudy.reporting.machine_readable import (
+    from rsfstudy.reporting.json_summaries import (
         build_result_variables_table,
         classify_file_contents,
         summarise_file_as_fields,
         summarise_study_as_fields,
     )
-    from rsfstudy.reporting.origin_tables import (
+    from rsfstudy.reporting.lattice_tables import (
+        summarise_study_as_text_lines,
+    )
+    from rsfstudy.reporting.origin_descriptions import (
         describe_scene_and_rig_fields,
         describe_slow_instability_norms,
     )
     from rsfstudy.reporting.reduction_tables import (
         build_reduction_tables_and_sentences,
     )
-    from rsfstudy.reporting.summaries import (
-        SummaryTableOrSentence,
-        build_motion_tables_and_sentences,
-        build_summary_tables_and_sentences,
-        describe_dataset_origin,
-        is_motion,
-    )
-    from rsfstudy.reporting.tables import (
+    from rsfstudy.reporting.text_tables import (
         TextTable,
         format_number_or_dash,
     )
@@ -87,25 +87,25 @@ else:
             "reporting.fit_summaries": ("format_with_error",),
             "reporting.hold_summaries": ("is_hold_table", "summarise_holds"),
             "reporting.lattice_tables": ("summarise_study_as_text_lines",),
-            "reporting.machine_readable": (
+            "reporting.json_summaries": (
                 "build_contents_table",
                 "classify_contents",
                 "summarise_file_as_fields",
                 "summarise_study_as_fields",
             ),
-            "reporting.origin_tables": (
+            "reporting.origin_descriptions": (
                 "describe_scene_and_rig_fields",
                 "note_on_norms_near_load_velocity",
             ),
             "reporting.reduction_tables": ("build_reduction_tables_and_sentences",),
-            "reporting.summaries": (
+            "reporting.dataset_summaries": (
                 "SummaryTableOrSentence",
                 "build_motion_tables_and_sentences",
                 "build_summary_tables_and_sentences",
                 "describe_dataset_origin",
                 "is_motion",
             ),
-            "reporting.tables": (
+            "reporting.text_tables": (
                 "TextTable",
                 "format_number_or_dash",
             ),

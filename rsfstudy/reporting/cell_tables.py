@@ -15,7 +15,7 @@ from rsfstudy.reporting.reduction_tables import (
     find_reasons_of_refused_reductions,
     format_missing_results,
 )
-from rsfstudy.reporting.tables import TextTable
+from rsfstudy.reporting.text_tables import TextTable
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 

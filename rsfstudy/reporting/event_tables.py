@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.formatting import read_flag_meanings
-from rsfstudy.reporting.tables import TextTable, format_number_or_dash, format_units
+from rsfstudy.reporting.text_tables import TextTable, format_number_or_dash, format_units
 
 #: Variables of the printed table with their headings.
 _HEADING_BY_EVENT_VARIABLE = {

@@ -18,7 +18,7 @@ from rsfstudy.reporting.fit_tables import (
     find_stderr_of_fixed_stiffness,
     split_into_single_fits,
 )
-from rsfstudy.reporting.tables import TextTable
+from rsfstudy.reporting.text_tables import TextTable
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 

@@ -17,7 +17,7 @@ from rsfstudy.fitting import (
 )
 from rsfstudy.former_data_names import TableWithFormerColumns, rename_former_variables
 from rsfstudy.quantities import read_units_or_scale
-from rsfstudy.reporting.tables import format_units
+from rsfstudy.reporting.text_tables import format_units
 from rsfstudy.status import Status
 
 #: Names that laboratories use for parameters, by parameter name in rsfstudy. The mapping contains

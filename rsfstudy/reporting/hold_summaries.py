@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.reporting.fit_summaries import format_value_with_stderr
-from rsfstudy.reporting.tables import TextTable
+from rsfstudy.reporting.text_tables import TextTable
 
 #: Headings of the quantities in the table that are printed with and without their errors.
 _HEADING_BY_QUANTITY_WITHOUT_ERROR = {"friction_before": "mu_0", "peak_friction": "peak"}

@@ -13,7 +13,7 @@ import xarray as xr
 from rsfstudy.formatting import format_list, format_value
 from rsfstudy.reporting.cell_tables import format_status_counts
 from rsfstudy.reporting.reduction_tables import list_names_of_slope_reductions
-from rsfstudy.reporting.tables import (
+from rsfstudy.reporting.text_tables import (
     MAX_CELLS_IN_THINNED_TABLE,
     TextTable,
     TextTableColumn,

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.formatting import format_value
-from rsfstudy.reporting.tables import (
+from rsfstudy.reporting.text_tables import (
     TextTable,
     TextTableColumn,
     build_table_along_dimensions,

@@ -7,7 +7,7 @@ import xarray as xr
 
 from rsfstudy.formatting import format_count_with_noun
 from rsfstudy.reporting.cell_tables import count_failed_cells_by_status
-from rsfstudy.reporting.tables import TextTable
+from rsfstudy.reporting.text_tables import TextTable
 from rsfstudy.study import Claim, format_verdict_row_for_report
 
 

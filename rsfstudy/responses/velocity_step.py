@@ -30,7 +30,7 @@ from rsfstudy.motion import (
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
-from rsfstudy.responses._motion_readings import (
+from rsfstudy.responses._motion_quantities import (
     choose_friction_quantity_for_events,
     compute_distance_from_steady_sliding,
 )

@@ -15,31 +15,31 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 if TYPE_CHECKING:
     from rsfstudy.rig.column_reading import ColumnsReadFromSource, ReadingOptions, read_columns
     from rsfstudy.rig.columns import Column
+    from rsfstudy.rig.common_headings import UsableColumns, has_time_column
     from rsfstudy.rig.dataset_units import DatasetUnits
+    from rsfstudy.rig.number_ranges import expand_range
     from rsfstudy.rig.protocol_files import read_protocol
-    from rsfstudy.rig.ranges import expand_range
     from rsfstudy.rig.record_files import read_record
     from rsfstudy.rig.rig import Rig
-    from rsfstudy.rig.rig_axes import RigAxes
     from rsfstudy.rig.rig_scenes import (
         LatticeScenesOnRig,
     )
+    from rsfstudy.rig.rig_study_axes import RigAxes
     from rsfstudy.rig.table_files import read_table
     from rsfstudy.rig.units import (
         compute_conversion_factor,
         convert_to_si,
         parse_number,
     )
-    from rsfstudy.rig.usual_headings import UsableColumns, has_time_column
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "rig.protocol_files": ("read_protocol",),
-            "rig.ranges": ("expand_range",),
+            "rig.number_ranges": ("expand_range",),
             "rig.record_files": ("read_record",),
             "rig.rig": ("Rig",),
-            "rig.rig_axes": ("RigAxes",),
+            "rig.rig_study_axes": ("RigAxes",),
             "rig.dataset_units": ("DatasetUnits",),
             "rig.rig_scenes": ("LatticeScenesOnRig",),
             # These are former exports, which ``DatasetUnits`` replaces.
@@ -54,7 +54,7 @@ else:
             "rig.columns": ("Column",),
             "rig.column_reading": ("ColumnsOfSource", "ReadingOptions", "read_columns"),
             "rig.table_files": ("read_table",),
-            "rig.usual_headings": ("UsableColumns", "has_time_column"),
+            "rig.common_headings": ("UsableColumns", "has_time_column"),
             "rig.units": (
                 "convert_to_si",
                 "parse_number",

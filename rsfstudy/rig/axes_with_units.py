@@ -13,7 +13,7 @@ from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.quantities import is_valid_variable_name
-from rsfstudy.rig.ranges import expand_range
+from rsfstudy.rig.number_ranges import expand_range
 from rsfstudy.rig.rig_quantities import (
     AXIS_NAME_BY_RIG_QUANTITY,
     RATIO_FIELD_BY_DIMENSIONAL_NAME,

@@ -13,18 +13,18 @@ from typing import Any, NamedTuple
 
 from rsfstudy.errors import CallError, InvalidValue, shorten_text
 from rsfstudy.rig.columns import Column
+from rsfstudy.rig.common_headings import (
+    UsableColumns,
+    check_column_values_are_finite,
+    read_selected_columns,
+)
 from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.source import SourceTable
+from rsfstudy.rig.readers.table_sources import SourceTable
 from rsfstudy.rig.row_selection import RowSelection
 from rsfstudy.rig.units import (
     compute_conversion_factor,
     convert_to_si,
     find_si_factor_and_exponents,
-)
-from rsfstudy.rig.usual_headings import (
-    UsableColumns,
-    check_column_values_are_finite,
-    read_selected_columns,
 )
 
 #: Exponents of the base units in a unit of force (see the module ``units``).

@@ -17,9 +17,9 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.column_reading import ReadingOptions, read_columns
 from rsfstudy.rig.columns import Column
+from rsfstudy.rig.common_headings import UsableColumns
 from rsfstudy.rig.rig import DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD, Rig
 from rsfstudy.rig.table_files import read_table
-from rsfstudy.rig.usual_headings import UsableColumns
 from rsfstudy.slider import (
     MIN_SEGMENT_DURATION,
     SEGMENT_MAPPING_KEYS,

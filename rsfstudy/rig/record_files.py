@@ -17,14 +17,14 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import RECORD_COLUMNS, Record
 from rsfstudy.rig.column_reading import ColumnsReadFromSource, ReadingOptions, read_columns
-from rsfstudy.rig.rig_quantities import is_stiffness_over_normal_stress
-from rsfstudy.rig.row_selection import parse_filter
-from rsfstudy.rig.units import convert_to_si
-from rsfstudy.rig.usual_headings import (
+from rsfstudy.rig.common_headings import (
     UsableColumns,
     build_missing_columns_error,
     compute_factor_to_record_units,
 )
+from rsfstudy.rig.rig_quantities import is_stiffness_over_normal_stress
+from rsfstudy.rig.row_selection import parse_filter
+from rsfstudy.rig.units import convert_to_si
 
 #: Columns of a file from which a ``Record`` is built.
 _USABLE_RECORD_COLUMNS = UsableColumns(

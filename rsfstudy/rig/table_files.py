@@ -20,7 +20,7 @@ from rsfstudy.rig.columns import (
     parse_column_selection,
 )
 from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.source import SourceTable
+from rsfstudy.rig.readers.table_sources import SourceTable
 
 __getattr__ = build_getattr_for_former_names(__name__)
 

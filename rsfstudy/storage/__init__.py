@@ -14,27 +14,31 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.storage.cell_columns import CellJournalRow, CellOutputPacker, CellResultArrays
     from rsfstudy.storage.cell_journal import (
         CellJournal,
         CellWallTimes,
     )
-    from rsfstudy.storage.cell_numbers import find_cell_number
-    from rsfstudy.storage.comparison import (
-        ResultsComparison,
-        compare_results,
-        compare_results_of_same_study,
+    from rsfstudy.storage.cell_number_lookup import find_cell_number
+    from rsfstudy.storage.cell_result_arrays import (
+        CellJournalRow,
+        CellOutputPacker,
+        CellResultArrays,
     )
     from rsfstudy.storage.dataset_files import (
         convert_attributes_for_netcdf,
         read_dataset,
         write_dataset,
     )
-    from rsfstudy.storage.declarations import build_scene_from_stored_fields
     from rsfstudy.storage.fingerprints import find_fingerprint_differences
     from rsfstudy.storage.lattice_coordinates import LatticeCoordinatesBuilder
     from rsfstudy.storage.lattice_datasets import assemble_study_dataset
+    from rsfstudy.storage.results_comparison import (
+        ResultsComparison,
+        compare_results,
+        compare_results_of_same_study,
+    )
     from rsfstudy.storage.stored_dataset import StoredDataset
+    from rsfstudy.storage.stored_declarations import build_scene_from_stored_fields
     from rsfstudy.storage.zarr_store import ZarrStore
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -42,14 +46,14 @@ else:
         {
             "storage.zarr_store": ("ZarrStore",),
             "storage.stored_dataset": ("StoredDataset",),
-            "storage.cell_numbers": ("find_cell_number",),
-            "storage.comparison": ("Comparison", "compare_results", "compare_same_lattice"),
-            "storage.cell_columns": ("CellColumns", "StoredCellRow", "OutputPacker"),
+            "storage.cell_number_lookup": ("find_cell_number",),
+            "storage.results_comparison": ("Comparison", "compare_results", "compare_same_lattice"),
+            "storage.cell_result_arrays": ("CellColumns", "StoredCellRow", "OutputPacker"),
             "storage.cell_journal": (
                 "CellTimings",
                 "CellJournal",
             ),
-            "storage.declarations": ("build_scene_from_stored",),
+            "storage.stored_declarations": ("build_scene_from_stored",),
             "storage.fingerprints": ("find_fingerprint_differences",),
             "storage.lattice_coordinates": ("LatticeCoordinates",),
             "storage.lattice_datasets": ("assemble_dataset",),

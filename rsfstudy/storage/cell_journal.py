@@ -25,7 +25,7 @@ import numpy as np
 
 from rsfstudy.errors import DataError, shorten_text
 from rsfstudy.status import Status
-from rsfstudy.storage.cell_columns import (
+from rsfstudy.storage.cell_result_arrays import (
     CellJournalRow,
     CellOutputPacker,
     CellResultArrays,

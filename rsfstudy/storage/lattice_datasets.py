@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.status import Status
-from rsfstudy.storage.cell_columns import CellOutputPacker, CellResultArrays
+from rsfstudy.storage.cell_result_arrays import CellOutputPacker, CellResultArrays
 from rsfstudy.storage.lattice_coordinates import build_variable_attributes
 from rsfstudy.storage.schema import FILE_LAYOUT_VERSION
 from rsfstudy.study import Study

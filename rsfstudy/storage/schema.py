@@ -16,12 +16,12 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, shorten_text
 from rsfstudy.status import Status
-from rsfstudy.storage.declarations import (
+from rsfstudy.storage.plain_data_conversion import build_invalid_entry_error, convert_plain_data
+from rsfstudy.storage.stored_declarations import (
     StoredStudyDeclaration,
     build_scene_from_stored_fields,
     parse_study_declaration,
 )
-from rsfstudy.storage.plain_data import build_invalid_entry_error, convert_plain_data
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 #: Version of the file layout. A file without a version number has layout 1. In layout 1, the digest

@@ -9,9 +9,9 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy.slider import Scene
-from rsfstudy.storage import dataset_scenes, rebuild_from_file, schema
-from rsfstudy.storage.declarations import StoredStudyDeclaration
+from rsfstudy.storage import scene_reconstruction, schema, study_reconstruction
 from rsfstudy.storage.schema import StoredProvenance
+from rsfstudy.storage.stored_declarations import StoredStudyDeclaration
 from rsfstudy.study import Study
 
 
@@ -53,12 +53,12 @@ class StoredDataset:
     @property
     def study(self) -> Study:
         """Complete study, even if the dataset contains only a selection of its cells."""
-        return rebuild_from_file.rebuild_study_without_user_code(self.dataset)
+        return study_reconstruction.rebuild_study_without_user_code(self.dataset)
 
     @property
     def primary_output_name(self) -> str | None:
         """Name of the primary output, or None if no output is numeric."""
-        return rebuild_from_file.find_primary_output_name(self.dataset)
+        return study_reconstruction.find_primary_output_name(self.dataset)
 
     def rebuild_study(self, study_file: str | Path | None = None) -> Study:
         """Rebuild the study of the results from its declaration.
@@ -73,7 +73,7 @@ class StoredDataset:
         Study
             Study of the results.
         """
-        return rebuild_from_file.rebuild_study(self.dataset, study_file)
+        return study_reconstruction.rebuild_study(self.dataset, study_file)
 
     def rebuild_scene(self, study: Study | None) -> Scene:
         """Return the scene of the dataset, or of the selected cell of a study.
@@ -88,7 +88,7 @@ class StoredDataset:
         Scene
             Scene of the dataset.
         """
-        return dataset_scenes.rebuild_scene(self.dataset, study)
+        return scene_reconstruction.rebuild_scene(self.dataset, study)
 
     def read_json_attribute(self, attribute_name: str) -> Any:
         """Decode a root attribute that contains JSON.

@@ -13,7 +13,7 @@ import xarray as xr
 
 from rsfstudy.parts import Segment
 from rsfstudy.slider import Protocol, SampledHistory, UserLoading, UserPart, protocol
-from rsfstudy.storage.plain_data import build_invalid_entry_error
+from rsfstudy.storage.plain_data_conversion import build_invalid_entry_error
 
 #: Dimension name of the rows, and description of the columns, for each kind of loading table.
 _SAMPLE_DIMENSION_AND_COLUMNS = (

@@ -21,7 +21,7 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.status import Status
-from rsfstudy.storage.cell_columns import CellOutputPacker, CellResultArrays
+from rsfstudy.storage.cell_result_arrays import CellOutputPacker, CellResultArrays
 from rsfstudy.storage.dataset_files import (
     ZARR_OPEN_OPTIONS,
     open_zarr_store,

@@ -13,30 +13,30 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
+    from rsfstudy.study.claim_verdict_table import format_verdict_row_for_report
     from rsfstudy.study.claims import (
         Claim,
         build_verdict_table,
     )
+    from rsfstudy.study.conversion_to_rig_units import convert_study_to_rig_units
     from rsfstudy.study.figure_declarations import (
         DrawFunction,
         Figure,
         Panel,
     )
     from rsfstudy.study.lattice_cell import Cell, CellFieldChanges
-    from rsfstudy.study.reductions.base import (
-        is_failed_or_pending,
-        read_quantities_not_in_vocabulary,
-    )
-    from rsfstudy.study.studies_on_rig import convert_study_to_rig_units
-    from rsfstudy.study.study import Study
-    from rsfstudy.study.study_index import (
+    from rsfstudy.study.named_study_index import (
         NAMED_STUDIES_PACKAGE,
         list_study_names,
         read_study_titles,
     )
+    from rsfstudy.study.reductions.base import (
+        is_failed_or_pending,
+        read_quantities_not_in_vocabulary,
+    )
+    from rsfstudy.study.study import Study
     from rsfstudy.study.study_loader import load_study
-    from rsfstudy.study.user_parts import find_user_parts_in_axis_rows
-    from rsfstudy.study.verdict_table import format_verdict_row_for_report
+    from rsfstudy.study.user_defined_parts import find_user_parts_in_axis_rows
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -53,11 +53,11 @@ else:
                 "Panel",
             ),
             "study.reductions.base": ("failed_cell_mask", "read_quantities_not_in_vocabulary"),
-            "study.studies_on_rig": ("convert_study_to_rig_units",),
+            "study.conversion_to_rig_units": ("convert_study_to_rig_units",),
             "study.study": ("Study",),
-            "study.study_index": ("STUDIES_PACKAGE", "study_names", "study_titles"),
-            "study.user_parts": ("find_named_user_parts",),
-            "study.verdict_table": ("format_verdict_row",),
+            "study.named_study_index": ("STUDIES_PACKAGE", "study_names", "study_titles"),
+            "study.user_defined_parts": ("find_named_user_parts",),
+            "study.claim_verdict_table": ("format_verdict_row",),
         },
     )
 

@@ -21,7 +21,7 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
-from rsfstudy.study.verdict_table import ClaimVerdictTable
+from rsfstudy.study.claim_verdict_table import ClaimVerdictTable
 
 REPRODUCED_VERDICT = "reproduced"
 DIFFERS_VERDICT = "differs"

@@ -20,7 +20,7 @@ from rsfstudy.quantities import is_valid_variable_name
 from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
 from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study.claims import Claim
-from rsfstudy.study.reductions.application import Reduction
+from rsfstudy.study.reductions.reduction_application import Reduction
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 #: Required types of the attributes of a study, and of the items of its list attributes. The rig is

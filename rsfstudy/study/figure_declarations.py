@@ -19,7 +19,7 @@ from rsfstudy.axes import Axis
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import is_valid_variable_name
-from rsfstudy.study.study_index import list_study_names
+from rsfstudy.study.named_study_index import list_study_names
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -36,9 +36,12 @@ from rsfstudy.study.axis_overrides import (
 from rsfstudy.study.claims import Claim
 from rsfstudy.study.figure_declarations import check_is_figure, get_figure_name_for_declaration
 from rsfstudy.study.lattice_cell import Cell, CellFieldChanges
-from rsfstudy.study.reductions.application import Reduction
+from rsfstudy.study.reductions.reduction_application import Reduction
 from rsfstudy.study.study_html import format_study_as_html
-from rsfstudy.study.user_parts import find_user_parts_in_axis_rows, list_user_field_quantities
+from rsfstudy.study.user_defined_parts import (
+    find_user_parts_in_axis_rows,
+    list_user_field_quantities,
+)
 
 #: Maximum length of the name of a study in bytes. Most file systems allow file names of at most 255
 #: bytes, and the names of files have suffixes.

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.path_checks import check_path_is_valid
-from rsfstudy.study.study_index import NAMED_STUDIES_PACKAGE, list_study_names
+from rsfstudy.study.named_study_index import NAMED_STUDIES_PACKAGE, list_study_names
 
 if TYPE_CHECKING:
     from rsfstudy.study.study import Study

@@ -33,8 +33,8 @@ from rsfstudy.quantities import format_unit_as_html as unit_in_html
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig import rig_quantities
 from rsfstudy.slider import SceneFields, part_registry
-from rsfstudy.study import study_index, study_loader
-from rsfstudy.study.verdict_table import format_published_value
+from rsfstudy.study import named_study_index, study_loader
+from rsfstudy.study.claim_verdict_table import format_published_value
 from rsfstudy.vocabulary import QUANTITY_BY_NAME, find_quantity
 
 #: Headings of the tables of claims.
@@ -406,7 +406,7 @@ def _measure(kind: type[Measure], example: Measure | None) -> str:
 @cache
 def _studies() -> dict[str, Study]:
     """Return the named studies by name."""
-    return {name: study_loader.load_study(name) for name in study_index.list_study_names()}
+    return {name: study_loader.load_study(name) for name in named_study_index.list_study_names()}
 
 
 def _format_call(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:

@@ -15,7 +15,7 @@ from playwright.sync_api import expect
 from study_runs import call_main
 
 import rsfstudy
-from rsfstudy.explorer.result_arrays import choose_drawn_point_indices
+from rsfstudy.explorer.curve_and_map_data import choose_drawn_point_indices
 
 VARIABLE = "critical_velocity_ratio"
 #: Script that returns the data sources with a given column. The document in the browser keeps the

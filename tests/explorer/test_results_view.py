@@ -6,7 +6,8 @@ import pytest
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.explorer.result_arrays import (
+from rsfstudy.explorer.cell_recomputation import recompute_cell_and_motion
+from rsfstudy.explorer.curve_and_map_data import (
     choose_drawn_point_indices,
     convert_mathtext_to_unicode,
     extract_curves_of_panel,
@@ -14,8 +15,7 @@ from rsfstudy.explorer.result_arrays import (
     find_cells_to_mark,
     sample_map_at_pixels,
 )
-from rsfstudy.explorer.result_cells import recompute_cell_and_motion
-from rsfstudy.explorer.result_selections import complete_selection
+from rsfstudy.explorer.plot_selections import complete_selection
 from rsfstudy.explorer.results_view import ResultsView
 from rsfstudy.measures import VelocityStep
 from rsfstudy.status import Status

@@ -9,8 +9,8 @@ import panel as pn
 import pytest
 
 import rsfstudy
-from rsfstudy.explorer.field_widgets import SliderRange
-from rsfstudy.explorer.jobs import BackgroundJobs
+from rsfstudy.explorer.background_jobs import BackgroundJobs
+from rsfstudy.explorer.number_widgets import SliderRange
 from rsfstudy.explorer.scene_controls import SceneControls
 from rsfstudy.explorer.scene_presets import SETTINGS_BY_PRESET_LABEL
 from rsfstudy.explorer.scene_settings import README_RIG_QUANTITIES, SceneSettings

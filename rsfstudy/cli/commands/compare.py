@@ -12,13 +12,13 @@ import click
 import rsfstudy
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
-from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.results import (
+from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
     CommandResult,
     print_result_as_text_or_json,
 )
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.errors import shorten_text
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def compare(given: options.CommandOptions) -> int:
 
 def _print_file_comparison(result: CompareCommandResult) -> None:
     """Print the files, the differences and the verdict."""
-    from rsfstudy.cli.agreement_tables import build_dataset_agreement_table
+    from rsfstudy.cli.dataset_agreement_tables import build_dataset_agreement_table
     from rsfstudy.formatting import format_count_with_noun, format_list
 
     found = result.differences

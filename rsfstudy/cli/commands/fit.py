@@ -12,18 +12,18 @@ import click
 import rsfstudy
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_results import (
+    EXIT_STATUS_FAILED,
+    EXIT_STATUS_OK,
+    CommandResult,
+    print_result_as_text_or_json,
+)
 from rsfstudy.cli.options import DecoratedFunction
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.record_options import (
     collect_record_reading_options,
     make_quantity_option,
     record_reading_options,
-)
-from rsfstudy.cli.results import (
-    EXIT_STATUS_FAILED,
-    EXIT_STATUS_OK,
-    CommandResult,
-    print_result_as_text_or_json,
 )
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue
@@ -241,7 +241,7 @@ def fit(given: options.CommandOptions) -> int:
     status is 0, even if a parameter is not identified.
     """
     from rsfstudy.api import STIFFNESS_OPTION_FROM_RECORD
-    from rsfstudy.cli.data_files import check_output_may_be_replaced
+    from rsfstudy.cli.overwrite_checks import check_output_may_be_replaced
     from rsfstudy.reporting import contains_fits
 
     data = given.output.with_suffix(".nc")

@@ -13,14 +13,14 @@ import click
 import rsfstudy
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
-from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.record_options import collect_record_reading_options, record_reading_options
-from rsfstudy.cli.results import (
+from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
     CommandResult,
     print_result_as_text_or_json,
 )
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
+from rsfstudy.cli.record_options import collect_record_reading_options, record_reading_options
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,8 +97,8 @@ def healing(given: options.CommandOptions) -> int:
     The exit status is 1 if no hold has a peak of friction on reloading, and 2 if the command line
     is invalid. Otherwise the exit status is 0.
     """
-    from rsfstudy.cli.data_files import check_output_may_be_replaced
     from rsfstudy.cli.figure_files import write_figure
+    from rsfstudy.cli.overwrite_checks import check_output_may_be_replaced
     from rsfstudy.execution import build_provenance_attributes
     from rsfstudy.reporting import is_hold_table
     from rsfstudy.storage import write_dataset

@@ -10,7 +10,7 @@ import click
 
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
-from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult, print_result_as_text_or_json
+from rsfstudy.cli.command_results import EXIT_STATUS_OK, CommandResult, print_result_as_text_or_json
 from rsfstudy.study import read_study_titles
 
 

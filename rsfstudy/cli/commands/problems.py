@@ -6,8 +6,8 @@ import click
 
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_results import EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line
-from rsfstudy.cli.results import EXIT_STATUS_OK
 
 
 @click.command(cls=OptionsObjectCommand)

@@ -12,8 +12,8 @@ import click
 import rsfstudy
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.errors import RsfStudyError
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _are_all_values_identical(agreement_by_variable: pd.DataFrame) -> bool:
 
 def _print_agreement_with_file(agreement_by_variable: pd.DataFrame) -> None:
     """Print the agreement of the recomputed results with the results file."""
-    from rsfstudy.cli.agreement_tables import build_dataset_agreement_table
+    from rsfstudy.cli.dataset_agreement_tables import build_dataset_agreement_table
 
     for name, (in_file, now) in agreement_by_variable.attrs["differs"].items():
         print_line(f"{name}: {in_file} in the file, {now} now", style="yellow")

@@ -8,7 +8,7 @@ import click
 
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
-from rsfstudy.cli.results import print_result_as_text_or_json
+from rsfstudy.cli.command_results import print_result_as_text_or_json
 
 _SUFFIXES_OF_RESULTS_FILES = (".nc", ".zarr")
 

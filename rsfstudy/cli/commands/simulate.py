@@ -10,8 +10,8 @@ import click
 import rsfstudy
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.status import Status
@@ -75,7 +75,7 @@ def simulate(given: options.CommandOptions) -> int:
     without inertia and without radiation damping is unphysical if its slip rate exceeds the
     instability norm. In this case, the exit status is 3. Otherwise the exit status is 0.
     """
-    from rsfstudy.cli.data_files import check_output_may_be_replaced
+    from rsfstudy.cli.overwrite_checks import check_output_may_be_replaced
     from rsfstudy.execution import build_provenance_attributes
     from rsfstudy.reporting import is_motion
 

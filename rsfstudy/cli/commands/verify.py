@@ -12,13 +12,13 @@ import click
 
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import OptionsObjectCommand
-from rsfstudy.cli.printing import print_line
-from rsfstudy.cli.results import (
+from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
     CommandResult,
     print_result_as_text_or_json,
 )
+from rsfstudy.cli.printing import print_line
 from rsfstudy.errors import InvalidValue
 
 if TYPE_CHECKING:

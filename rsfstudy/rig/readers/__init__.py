@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.readers.arrays import (
+from rsfstudy.rig.readers.arrays_and_netcdf import (
     is_mapping_or_dataframe,
     is_netcdf_file,
     is_record_object,
@@ -24,11 +24,14 @@ from rsfstudy.rig.readers.arrays import (
 )
 from rsfstudy.rig.readers.compressed_files import decompress_file, is_compressed_file
 from rsfstudy.rig.readers.matlab_files import is_matlab_file, read_matlab_file
-from rsfstudy.rig.readers.source import SourceTable, TableSource
 from rsfstudy.rig.readers.spreadsheets import is_workbook, read_workbook
+from rsfstudy.rig.readers.table_sources import SourceTable, TableSource
 from rsfstudy.rig.readers.tdms_files import is_tdms_file, read_tdms_file
 from rsfstudy.rig.readers.text_files import is_text_file, read_text_file
-from rsfstudy.rig.readers.unknown_files import is_unsupported_format, raise_unsupported_format_error
+from rsfstudy.rig.readers.unsupported_formats import (
+    is_unsupported_format,
+    raise_unsupported_format_error,
+)
 from rsfstudy.rig.readers.xlook_files import is_binary_file, read_xlook_file
 
 #: Readers in the order in which they are tried. The first function of each pair recognises a

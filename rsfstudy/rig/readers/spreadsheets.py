@@ -14,7 +14,7 @@ import pandas as pd
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
-from rsfstudy.rig.readers.source import SourceTable, TableSource
+from rsfstudy.rig.readers.table_sources import SourceTable, TableSource
 from rsfstudy.rig.readers.text_layout import detect_text_layout
 from rsfstudy.rig.units import parse_number
 

@@ -13,7 +13,7 @@ import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
-from rsfstudy.rig.readers.source import SourceTable, TableSource
+from rsfstudy.rig.readers.table_sources import SourceTable, TableSource
 from rsfstudy.rig.readers.text_layout import (
     BLANK_DELIMITER,
     COMMENT_LINE_PREFIXES,

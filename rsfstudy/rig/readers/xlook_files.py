@@ -6,7 +6,7 @@ import numpy as np
 
 from rsfstudy.errors import DataError
 from rsfstudy.rig.columns import Column
-from rsfstudy.rig.readers.source import SourceTable, TableSource, append_units_to_headings
+from rsfstudy.rig.readers.table_sources import SourceTable, TableSource, append_units_to_headings
 
 #: Layout of xlook files. The constants are the size of the file header in bytes, the size of each
 #: column header in bytes, and the number of column headers. The data of an xlook file follow the

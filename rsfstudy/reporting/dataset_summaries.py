@@ -15,7 +15,7 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import EVENT_QUANTITIES
 from rsfstudy.formatting import read_flag_meanings
-from rsfstudy.reporting import fit_tables, origin_tables
+from rsfstudy.reporting import fit_tables, origin_descriptions
 from rsfstudy.reporting.fit_summaries import summarise_fits
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
 from rsfstudy.reporting.reduction_tables import (
@@ -23,7 +23,7 @@ from rsfstudy.reporting.reduction_tables import (
     find_reasons_of_refused_reductions,
     format_missing_results,
 )
-from rsfstudy.reporting.tables import (
+from rsfstudy.reporting.text_tables import (
     MAX_CELLS_IN_THINNED_TABLE,
     TextTable,
     build_single_scene_result_table,
@@ -57,7 +57,7 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
         yield build_primary_output_table(dataset)
         yield from build_reduction_tables(dataset)
         yield format_missing_results(dataset, find_reasons_of_refused_reductions(dataset))
-        yield from filter(None, [origin_tables.describe_slow_instability_norms(dataset)])
+        yield from filter(None, [origin_descriptions.describe_slow_instability_norms(dataset)])
     elif is_motion(dataset):
         yield summarise_motion(dataset)
         try:
@@ -125,12 +125,12 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
         Descriptions of the scene or the lattice, the command, the versions and the status.
     """
     if not StoredDataset(dataset).is_of_single_scene:
-        return origin_tables.describe_study_origin(dataset)
+        return origin_descriptions.describe_study_origin(dataset)
     about, scene = dataset.attrs, StoredDataset(dataset).scene_fields
     fields = {n: v for n, v in scene.items() if n not in ("segments", "samples")}
     rig = StoredDataset(dataset).read_json_attribute("laboratory") if "laboratory" in about else {}
     return {
-        **origin_tables.describe_scene_and_rig_fields("scene", fields, rig),
+        **origin_descriptions.describe_scene_and_rig_fields("scene", fields, rig),
         "command": about.get("history", "unknown"),
         "versions": about.get("source", "unknown"),
         "status": f"{about['status']} {about.get('message', '')}".strip(),

@@ -8,9 +8,9 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.explorer.result_arrays import find_error_variable_name, list_shown_variable_names
-from rsfstudy.explorer.result_cells import RecomputedCell
-from rsfstudy.explorer.result_selections import MAP, PlotSelection
+from rsfstudy.explorer.cell_recomputation import RecomputedCell
+from rsfstudy.explorer.curve_and_map_data import find_error_variable_name, list_shown_variable_names
+from rsfstudy.explorer.plot_selections import MAP, PlotSelection
 from rsfstudy.plots import Figure, draw_figure
 from rsfstudy.study import Figure as DeclaredFigure
 from rsfstudy.study import Panel

@@ -13,7 +13,10 @@ import xarray as xr
 from bokeh.plotting import figure
 
 from rsfstudy.api import recompute_cell, simulate
-from rsfstudy.explorer.result_arrays import choose_drawn_point_indices, convert_mathtext_to_unicode
+from rsfstudy.explorer.curve_and_map_data import (
+    choose_drawn_point_indices,
+    convert_mathtext_to_unicode,
+)
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.plots import format_axis_label
 from rsfstudy.slider import Scene

@@ -18,9 +18,9 @@ import panel as pn
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.explorer.jobs import BackgroundJobs
-from rsfstudy.explorer.messages import escape_markdown as escape_markdown
-from rsfstudy.explorer.messages import format_error_as_markdown
+from rsfstudy.explorer.background_jobs import BackgroundJobs
+from rsfstudy.explorer.error_messages import escape_markdown as escape_markdown
+from rsfstudy.explorer.error_messages import format_error_as_markdown
 from rsfstudy.plots import Figure, render_figure, style_context
 from rsfstudy.storage import write_dataset
 

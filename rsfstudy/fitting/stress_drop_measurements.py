@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from rsfstudy.fitting.drop_detection import (
+from rsfstudy.fitting.stress_drop_detection import (
     DETECTION_MARGIN_IN_STANDARD_DEVIATIONS,
     FALSE_DETECTION_PROBABILITY,
     Detection,
@@ -21,12 +21,12 @@ from rsfstudy.fitting.drop_detection import (
     estimate_robust_sd,
     find_smallest_nonzero_difference,
 )
-from rsfstudy.fitting.drop_fit import HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS
-from rsfstudy.fitting.stress_drop_fits import (
+from rsfstudy.fitting.stress_drop_search import (
     DetectedAndFittedStressDrop,
     EventNumbers,
     find_stress_drops,
 )
+from rsfstudy.fitting.three_line_stress_drop_fit import HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS
 
 #: Smallest difference between the displacement during the drops and the displacement in equally
 #: long intervals before and after the drops. The first value is in standard deviations of the

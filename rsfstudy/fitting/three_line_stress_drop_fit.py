@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.fitting.drop_detection import StressDropCandidate
+from rsfstudy.fitting.stress_drop_detection import StressDropCandidate
 
 #: Settings for the number of samples to fit on each side of a drop. The samples extend over the
 #: window length times the first value, or over the duration of the drop times the second value,

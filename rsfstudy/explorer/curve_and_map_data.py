@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from rsfstudy.explorer.result_selections import PlotSelection, find_dimension_along_x
+from rsfstudy.explorer.plot_selections import PlotSelection, find_dimension_along_x
 from rsfstudy.plots import are_log_spaced, compute_cell_edges, describe_point
 from rsfstudy.status import Status
 

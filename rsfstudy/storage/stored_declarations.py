@@ -24,7 +24,7 @@ from rsfstudy.motion import Accuracy
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig import Rig
 from rsfstudy.slider import BUILT_IN_FLUID_CLASS_BY_NAME, Scene, SceneFields, UserLoading, UserPart
-from rsfstudy.storage.plain_data import (
+from rsfstudy.storage.plain_data_conversion import (
     build_dataclass_from_plain_data,
     build_invalid_entry_error,
     construct_from_field_values,

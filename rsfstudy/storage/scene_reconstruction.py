@@ -11,10 +11,10 @@ import xarray as xr
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import SampledHistory, Scene, SceneFields, UserLoading, UserPart, protocol
-from rsfstudy.storage.declarations import build_scene_from_stored_fields
 from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
-from rsfstudy.storage.plain_data import build_invalid_entry_error
+from rsfstudy.storage.plain_data_conversion import build_invalid_entry_error
 from rsfstudy.storage.schema import read_scene_fields
+from rsfstudy.storage.stored_declarations import build_scene_from_stored_fields
 from rsfstudy.study import Study
 
 

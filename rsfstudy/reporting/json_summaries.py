@@ -16,15 +16,15 @@ from rsfstudy.reporting.cell_tables import (
     count_cells_by_status,
     count_pending_cells,
 )
+from rsfstudy.reporting.dataset_summaries import compute_duration_and_peaks_of_motion, is_motion
 from rsfstudy.reporting.fit_tables import contains_fits, summarise_fits_as_fields
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
-from rsfstudy.reporting.origin_tables import find_constant_fields
+from rsfstudy.reporting.origin_descriptions import find_constant_fields
 from rsfstudy.reporting.reduction_tables import (
     build_reduction_tables,
     find_reasons_of_missing_reductions,
 )
-from rsfstudy.reporting.summaries import compute_duration_and_peaks_of_motion, is_motion
-from rsfstudy.reporting.tables import TextTable, build_single_scene_result_table
+from rsfstudy.reporting.text_tables import TextTable, build_single_scene_result_table
 from rsfstudy.storage import StoredDataset
 from rsfstudy.vocabulary import find_coverage_content_type
 

@@ -14,7 +14,7 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSelection, parse_column_selection
 from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.source import SourceTable
+from rsfstudy.rig.readers.table_sources import SourceTable
 from rsfstudy.rig.units import compute_conversion_factor
 
 #: SI units of the columns of a record, and factors from SI units to the units of `Record`.

@@ -18,7 +18,7 @@ from rsfstudy.slider import Scene
 from rsfstudy.storage import StoredDataset, read_dataset
 
 if TYPE_CHECKING:
-    from rsfstudy.explorer.view import ExplorerView
+    from rsfstudy.explorer.base_view import ExplorerView
 
 #: Class of each view, as module and name. The modules import Panel.
 _MODULE_AND_CLASS_BY_VIEW_KIND = {

@@ -10,8 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.fitting.drop_detection import Detection, StressDropCandidate, detect_stress_drops
-from rsfstudy.fitting.drop_fit import FittedStressDrop, fit_stress_drop
+from rsfstudy.fitting.stress_drop_detection import (
+    Detection,
+    StressDropCandidate,
+    detect_stress_drops,
+)
+from rsfstudy.fitting.three_line_stress_drop_fit import FittedStressDrop, fit_stress_drop
 
 #: Scale, table heading and description of each property of an event.
 EVENT_QUANTITIES = {

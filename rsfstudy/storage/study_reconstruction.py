@@ -16,7 +16,9 @@ import xarray as xr
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
 from rsfstudy.slider import SceneFields, UserPart
 from rsfstudy.storage import schema, stored_loadings
-from rsfstudy.storage.declarations import (
+from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
+from rsfstudy.storage.plain_data_conversion import build_invalid_entry_error
+from rsfstudy.storage.stored_declarations import (
     MISSING_STUDY_FILE_REMEDY,
     StoredStudyDeclaration,
     build_measure,
@@ -25,8 +27,6 @@ from rsfstudy.storage.declarations import (
     build_scene_from_stored_fields,
     find_user_part_missing_from_file,
 )
-from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
-from rsfstudy.storage.plain_data import build_invalid_entry_error
 from rsfstudy.study import Study, list_study_names, load_study
 from rsfstudy.vocabulary import find_coverage_content_type
 

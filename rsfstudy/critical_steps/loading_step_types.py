@@ -11,8 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
-from rsfstudy.critical_steps.shooting_steps import (
+from rsfstudy.critical_steps.loading_step_families import (
     LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT,
     LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA,
     MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL,
@@ -21,6 +20,7 @@ from rsfstudy.critical_steps.shooting_steps import (
     LoadingStepFamilySolvedByShooting,
     compute_slip_lag_due_to_inertia,
 )
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.critical_steps.stability_after_step import (
     compute_stability_margin,
     is_linearly_stable,
