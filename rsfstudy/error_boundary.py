@@ -86,7 +86,7 @@ def wrap_methods_in_error_boundary(wrapped_class: WrappedClass) -> WrappedClass:
 
     Parameters
     ----------
-    guarded_class : type
+    wrapped_class : type
         Class to wrap. This class is modified in place.
 
     Returns

@@ -142,7 +142,7 @@ class InvalidValue(RsfStudyError, ValueError):
 
         Parameters
         ----------
-        place : str
+        location : str
             Location of the invalid value, for example a file name and a line.
 
         Returns

@@ -182,7 +182,7 @@ class TableWithFormerColumns(pd.DataFrame):
     """Data frame whose columns can also be selected by their former names.
 
     A selection is an ordinary data frame with the requested names. A subclass defines
-    ``NEW_COLUMNS``.
+    ``NEW_COLUMN_BY_FORMER_COLUMN``.
     """
 
     #: New column names by former name. A key that begins with an underscore is a suffix.

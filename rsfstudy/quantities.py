@@ -310,7 +310,7 @@ def format_quantities_as_html_table(
 
     Parameters
     ----------
-    rows : iterable of tuple
+    quantities_with_values : iterable of tuple
         Pairs of a quantity and its value.
     caption : str, default: ""
         Text above the table.
@@ -372,7 +372,7 @@ def format_symbol_as_html(latex_symbol: str) -> HtmlMarkup:
 
     Parameters
     ----------
-    formula : str
+    latex_symbol : str
         Symbol of a quantity. If the symbol contains no dollar signs, it is escaped but not
         converted.
 

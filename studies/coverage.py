@@ -207,8 +207,9 @@ class CoverageStatistics(Reduction):
     ----------
     name : str
         Prefix of the results: ``<name>_share`` (fraction of errors that do not exceed their
-        estimates), ``<name>_worst`` (largest ratio of an error to its estimate), ``<name>_typical``
-        (median ratio of estimates to errors) and ``<name>_numbers`` (number of errors).
+        estimates), ``<name>_worst`` (largest ratio of an error to its estimate),
+        ``<name>_find_typical_value`` (median ratio of estimates to errors) and ``<name>_numbers``
+        (number of errors).
     of : str
         Variable that contains the ratios of errors to error estimates, with NaN for missing
         results.

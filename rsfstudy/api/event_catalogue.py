@@ -44,7 +44,7 @@ def build_event_catalogue(
 
     Parameters
     ----------
-    event_numbers : sequence of (dict, int)
+    measured_events : sequence of (dict, int)
         Quantities of each event, and the code that describes which part of the event is missing.
         Each quantity is a value with its error. The function adds the interval since the previous
         event to each dictionary.

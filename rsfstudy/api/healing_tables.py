@@ -142,8 +142,8 @@ def _measure_hold_of_motion(
     """Measure a hold of a motion.
 
     The row numbers refer to the first row of the hold, the last row of the hold, and the last row
-    of the reloading. Friction has a peak if friction falls by more than ``min_fall`` after its
-    maximum.
+    of the reloading. Friction has a peak if friction falls by more than ``min_friction_fall`` after
+    its maximum.
 
     Returns
     -------

@@ -43,12 +43,12 @@ def find_motion_events(
     ----------
     motion : xarray.Dataset
         Motion from ``rsfstudy.simulate``, in any units.
-    slip_rate : float, optional
+    slip_rate_threshold : float, optional
         Threshold of the slip rate in V_*. The default is 10 times the highest load point velocity
         of the scene, and at least 10.
     scene : callable
         Function without arguments that returns the scene of the motion. The function is called only
-        if ``slip_rate`` is None.
+        if ``slip_rate_threshold`` is None.
 
     Returns
     -------

@@ -35,7 +35,7 @@ def show_progress(
     ----------
     study_name : str
         Name of the study, which is displayed next to the bar.
-    is_shown : bool or callable
+    is_shown_or_callback : bool or callable
         If False, nothing is displayed. If a function, the function receives the number of
         completed items, the number of all items and the remaining time in s instead.
     items : str, default: "cells"
@@ -46,8 +46,8 @@ def show_progress(
     Yields
     ------
     callable
-        Function ``update(done, total, remaining_seconds)`` that displays the number of completed
-        cells and the remaining time.
+        Function ``update(done, total, estimate_remaining_seconds)`` that displays the number of
+        completed cells and the remaining time.
     """
     console = Console(stderr=True)
     if callable(is_shown_or_callback):
@@ -127,7 +127,7 @@ def compile_equations_with_notice(
         Scenes whose equations are compiled. Scenes with the same parts share their equations.
     with_time_variable_flags : sequence of bool
         Variants of the equations to compile. True selects the equations with time as a variable.
-    is_shown : bool
+    is_notice_shown : bool
         If False, nothing is displayed.
     """
     console, before = (

@@ -73,9 +73,9 @@ def check_displacement_is_not_slip(
         Records to check.
     step_numbers : sequence of int
         Numbers of the steps to fit.
-    ratio, machine : float
-        Stiffness. ``ratio`` is the stiffness divided by normal stress in 1/um, and ``machine`` is
-        the stiffness in Pa/um. One of the two values is 0.
+    stiffness_over_normal_stress, machine_stiffness : float
+        Stiffness. ``stiffness_over_normal_stress`` is the stiffness divided by normal stress in
+        1/um, and ``machine_stiffness`` is the stiffness in Pa/um. One of the two values is 0.
 
     Raises
     ------

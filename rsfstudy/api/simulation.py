@@ -500,7 +500,7 @@ def make_row_times_strictly_increasing(recorded_rows: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    table : numpy.ndarray of shape (rows, columns)
+    recorded_rows : numpy.ndarray of shape (rows, columns)
         Recorded motion. The first column is time.
 
     Returns

@@ -30,14 +30,14 @@ class StressRecord(NamedTuple):
 
     Parameters
     ----------
-    variables : mapping of str to array_like or None
+    variables_by_name : mapping of str to array_like or None
         Arrays ``time``, ``displacement`` and ``shear_stress``. The attribute ``units`` of an array
         contains its units.
     has_time : bool, default: True
         False if the record contains displacement in place of time.
-    is_slip : bool, default: False
+    displacement_is_slip : bool, default: False
         True if the displacement is the slip of the fault.
-    processing : tuple of str, default: ()
+    processing_steps : tuple of str, default: ()
         Descriptions of the selection of rows and of filters.
     """
 
@@ -63,7 +63,7 @@ def read_stress_record(
         Heading and units of columns by name.
     normal_stress : quantity
         Normal stress by which friction is multiplied. None if the normal stress is unknown.
-    options : ReadingOptions
+    reading_options : ReadingOptions
         Reading options.
 
     Returns

@@ -254,7 +254,7 @@ def compute_field_values_from_samples(
     ----------
     sampled_values : mapping of str to array_like
         Samples of each quantity.
-    field_sources : mapping of str to str or callable, or None
+    quantity_or_function_by_field : mapping of str to str or callable, or None
         Source of each field. If None, each quantity sets the field of the same name.
 
     Returns

@@ -26,7 +26,7 @@ def parse_overrides(study: Study, assignments: tuple[str, ...]) -> dict[str, Any
     ----------
     study : Study
         Study whose axis labels are recognised in the values.
-    settings : tuple of str
+    assignments : tuple of str
         Values of the option ``--set``.
 
     Returns
@@ -60,7 +60,7 @@ def parse_scene_field_assignments(assignments: tuple[str, ...]) -> dict[str, Any
 
     Parameters
     ----------
-    settings : tuple of str
+    assignments : tuple of str
         Values of the option ``--set``, in the form ``FIELD=VALUE``.
 
     Returns
@@ -98,7 +98,7 @@ def read_loading_if_csv_path(loading_or_path: Any, rig: Rig | None) -> Any:
 
     Parameters
     ----------
-    file_path : object
+    loading_or_path : object
         Value of the field ``loading``.
     rig : Rig or None
         Rig that converts the values in the file to dimensionless values.
@@ -138,7 +138,7 @@ def build_rig_from_options(text_by_option_name: Mapping[str, str]) -> Rig:
 
     Parameters
     ----------
-    option_texts : mapping of str to str
+    text_by_option_name : mapping of str to str
         Option values by option name. Options that do not belong to the rig are ignored.
 
     Returns
@@ -197,7 +197,7 @@ def split_assignment(option_name: str, text: str, expected_form: str) -> tuple[s
         Name of the option, for the error message.
     text : str
         Assignment such as ``law=slowness``.
-    format_rule : str
+    expected_form : str
         Description of the expected form, for the error message.
 
     Returns
@@ -248,7 +248,7 @@ def parse_axis_assignment(text: str, axis_labels: Collection[str]) -> tuple[str,
     text : str
         Assignment ``AXIS=VALUES``. The values are a label, a single value, a comma-separated list,
         a range ``start:stop:count``, or a logarithmic range ``start:stop:count:log``.
-    known_labels : collection of str
+    axis_labels : collection of str
         Labels of the axes. The function does not split a known label, because labels may contain
         commas.
 

@@ -52,7 +52,7 @@ def print_result_as_text_or_json(
     ----------
     result : CommandResult
         Result of a command.
-    print_result : callable
+    print_as_text : callable
         Function that prints the result as text.
     as_json : bool
         If True, print JSON instead of text.

@@ -43,12 +43,12 @@ class StudyCostEstimate:
         Estimated computing time in s.
     cell_count : int
         Number of distinct cells of the study.
-    measured_cells : int
+    measured_cell_count : int
         Number of cells of the study with a measured computing time.
-    timed_cells : int
+    timed_cell_count_in_journal : int
         Number of all cells with a measured computing time in the journal. If this number is 0, the
         estimated computing time is based on typical times.
-    journal : Path
+    journal_path : Path
         Path of the journal.
     """
 
@@ -140,7 +140,10 @@ def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
         return f"{text}roughly {time} (may be up to ten times longer)"
     if cost.measured_cell_count == cost.cell_count:
         return f"{text}last run took {time} ({cost.journal_path})"
-    return f"{text}about {time}, based on {cost.timed_cell_count_in_journal:,} cells in {cost.journal_path}"
+    return (
+        f"{text}about {time}, based on {cost.timed_cell_count_in_journal:,} cells in "
+        f"{cost.journal_path}"
+    )
 
 
 def suggest_compiled_engine(cell_plan: CellPlan, output_directory: Path) -> str:

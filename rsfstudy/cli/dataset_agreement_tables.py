@@ -12,7 +12,7 @@ def build_dataset_agreement_table(agreement_by_variable: pd.DataFrame) -> TextTa
 
     Parameters
     ----------
-    agreement : pandas.DataFrame
+    agreement_by_variable : pandas.DataFrame
         Table with one row per variable. The functions ``rsfstudy.rerun`` and ``rsfstudy.compare``
         return such tables.
 

@@ -56,7 +56,7 @@ def build_default_figure_path(results_path: Path, command_options: CommandOption
     ----------
     results_path : Path
         Path of the results file. The file need not exist.
-    options : CommandOptions
+    command_options : CommandOptions
         Arguments and options of the command.
 
     Returns
@@ -110,7 +110,7 @@ def draw_and_save_figure(
         Results of a study.
     figure_path : Path
         Path of the figure.
-    options : CommandOptions
+    command_options : CommandOptions
         Arguments and options of the command.
     user_figure : callable, str or None
         Figure that replaces the figure in the declaration of the study.

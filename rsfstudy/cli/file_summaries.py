@@ -30,7 +30,7 @@ class FileSummary(CommandResult):
     ----------
     dataset : xarray.Dataset
         Contents of the file.
-    file : str
+    file_path : str
         Path of the file.
     """
 

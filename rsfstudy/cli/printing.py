@@ -48,7 +48,7 @@ def print_tables_and_sentences(tables_and_sentences: Iterable[SummaryTableOrSent
 
     Parameters
     ----------
-    pieces : iterable of (TextTable, mapping of str to str, or str)
+    tables_and_sentences : iterable of (TextTable, mapping of str to str, or str)
         Items to print. Empty tables and empty mappings are not printed.
     """
     from rsfstudy.cli.table_layout import print_table_or_sentence

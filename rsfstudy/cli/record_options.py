@@ -119,7 +119,7 @@ def collect_record_reading_options(command_options: CommandOptions) -> dict[str,
 
     Parameters
     ----------
-    given : CommandOptions
+    command_options : CommandOptions
         Options of the command.
 
     Returns

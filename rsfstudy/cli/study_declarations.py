@@ -103,7 +103,7 @@ def print_study_declaration(declaration: StudyDeclaration) -> None:
 
     Parameters
     ----------
-    declared : StudyDeclaration
+    declaration : StudyDeclaration
         Declaration to print.
     """
     study = declaration.study

@@ -25,7 +25,7 @@ def list_selected_study_names(command_options: CommandOptions) -> list[str]:
 
     Parameters
     ----------
-    options : CommandOptions
+    command_options : CommandOptions
         Arguments and options of the command.
 
     Returns
@@ -53,7 +53,7 @@ def build_study_from_options(study_name: str, command_options: CommandOptions) -
     ----------
     study_name : str
         Name of a study, or path of a study file.
-    options : CommandOptions
+    command_options : CommandOptions
         Arguments and options of the command.
 
     Returns
@@ -93,7 +93,7 @@ def open_worker_pool(
 
     Parameters
     ----------
-    options : CommandOptions
+    command_options : CommandOptions
         Arguments and options of the command.
     log_path : Path, optional
         File for the error output of the worker processes.

@@ -38,7 +38,7 @@ class StudyResults:
     ----------
     dataset : xarray.Dataset
         Results of the study.
-    file : str
+    file_path : str
         Path of the results file. The path is part of the shell commands that recompute failed
         cells.
     """
@@ -92,7 +92,7 @@ def collect_verdicts(study_results: Sequence[StudyResults]) -> pd.DataFrame:
 
     Parameters
     ----------
-    studies : sequence of StudyResults
+    study_results : sequence of StudyResults
         Results of at least one study.
 
     Returns
@@ -160,7 +160,10 @@ def print_verdicts(verdicts: pd.DataFrame) -> None:
     if checked:
         print_tables_and_sentences([build_claims_table(verdicts)])
     print_unexpected_verdicts(verdicts)
-    line = f"{checked} of {format_count_with_noun(len(verdicts), 'claim')} checked: {format_verdict_counts(verdicts)}"
+    line = (
+        f"{checked} of {format_count_with_noun(len(verdicts), 'claim')} checked: "
+        f"{format_verdict_counts(verdicts)}"
+    )
     print_line(line if len(verdicts) else "no claims")
 
 
@@ -185,7 +188,7 @@ def print_failed_cells(results: StudyResults, with_rerun_commands: bool = True) 
     ----------
     results : StudyResults
         Results of the study.
-    with_commands : bool, default: True
+    with_rerun_commands : bool, default: True
         If False, the function does not print the commands.
     """
     if results.pending_cell_count:

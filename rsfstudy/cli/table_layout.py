@@ -26,7 +26,7 @@ def print_table_or_sentence(table_or_sentence: SummaryTableOrSentence) -> None:
 
     Parameters
     ----------
-    summary_piece : TextTable, mapping of str to str, or str
+    table_or_sentence : TextTable, mapping of str to str, or str
         Text to print. Empty tables and empty mappings are not printed.
     """
     if isinstance(table_or_sentence, str):

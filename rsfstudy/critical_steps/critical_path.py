@@ -64,13 +64,13 @@ class CriticalPath(NamedTuple):
     ----------
     log_slip_rate_at_instability_norm : float
         Value of ln(V/V_*) at the instability norm.
-    min_frictional_stress : float
+    frictional_stress_at_zero_normal_stress : float
         Frictional stress at which the normal stress vanishes, in units of sigma_*.
     radiated_stress_at_instability_norm : float
         Stress that seismic waves radiate at the instability norm, in units of sigma_*.
     spring_stress_and_states_after_step : tuple of float
         Spring stress and states immediately after the step.
-    parameters : tuple of float
+    scene_parameter_values : tuple of float
         Parameters of the scene.
     tangency_point_solver : callable
         Function ``(x, weakest, p) -> (g, Psi)``. See ``_build_tangency_point_solver``.
@@ -178,7 +178,7 @@ class CriticalPath(NamedTuple):
 
         Parameters
         ----------
-        tolerance : float
+        local_tolerance : float
             Local error tolerance of the integration.
         crossing_quantity_and_level : tuple of str and float
             Name and level of a quantity. The path starts at a point at which the quantity crosses
@@ -245,7 +245,7 @@ class CriticalPath(NamedTuple):
 
         Parameters
         ----------
-        tolerance : float
+        local_tolerance : float
             Local error tolerance of the integration.
 
         Returns
@@ -275,7 +275,7 @@ class CriticalPath(NamedTuple):
 
         Parameters
         ----------
-        tolerance : float
+        local_tolerance : float
             Local error tolerance of the integration.
 
         Returns
@@ -296,7 +296,7 @@ class CriticalPath(NamedTuple):
 
         Parameters
         ----------
-        tolerance : float
+        local_tolerance : float
             Local error tolerance of the integration.
 
         Returns

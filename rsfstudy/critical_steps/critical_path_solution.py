@@ -1,8 +1,8 @@
 """Boundary between stable and unstable step sizes, with its numerical error.
 
-The function ``find_boundary_by_critical_path`` computes the boundary from the critical path. The
-function ``find_boundary_by_limit_cycle`` computes the step size at which a limit cycle touches the
-instability norm.
+The function ``find_critical_size_by_critical_path`` computes the boundary from the critical path.
+The function ``find_critical_size_by_limit_cycle`` computes the step size at which a limit cycle
+touches the instability norm.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class CriticalStepSizeEstimate:
     Parameters
     ----------
     step_size : float
-        Size of the step. See ``StepFamily``.
+        Size of the step. See ``LoadingStepFamily``.
     relative_error : float
         Relative error of the step size.
     found_from_forward_motions : bool, default: False

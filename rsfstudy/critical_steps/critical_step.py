@@ -55,7 +55,7 @@ STEP_FAMILY_BY_SCENE_FIELD: Mapping[str, type[LoadingStepFamily]] = {
 }
 STEP_DIRECTIONS = ("up", "down")
 #: Aliases of scene fields. The names of the scene fields are the keys of
-#: ``STEP_FAMILY_BY_QUANTITY``.
+#: ``STEP_FAMILY_BY_SCENE_FIELD``.
 SCENE_FIELD_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Largest relative tolerance for the step size at which a limit cycle touches the instability norm.

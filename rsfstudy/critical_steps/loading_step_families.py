@@ -1,8 +1,8 @@
 """Families of steps, and the shooting method that finds critical steps.
 
-The base class ``StepFamily`` describes all steps of one type and direction, ordered by size. The
-class ``ShootingStepFamily`` adds the shooting method. The module ``step_types`` contains the
-concrete classes.
+The base class ``LoadingStepFamily`` describes all steps of one type and direction, ordered by size.
+The class ``LoadingStepFamilySolvedByShooting`` adds the shooting method. The module ``step_types``
+contains the concrete classes.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class LoadingStepFamily:
         ----------
         step_size : float
             Size of the step.
-        relative_error : float
+        step_size_relative_error : float
             Relative error of the step size.
 
         Returns
@@ -137,14 +137,14 @@ class LoadingStepFamily:
         r"""Convert a tolerance of the step value to a tolerance of the step size.
 
         A relative error of the step size that equals the returned tolerance causes a relative error
-        ``value_tolerance`` in the change of the step value. The size tolerance is at most
-        ``value_tolerance``.
+        ``field_value_tolerance`` in the change of the step value. The size tolerance is at most
+        ``field_value_tolerance``.
 
         Parameters
         ----------
         step_size : float
             Size of the step.
-        value_tolerance : float
+        field_value_tolerance : float
             Relative tolerance of the change in the step value.
 
         Returns
@@ -331,7 +331,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
     def compute_field_value_error(self, step_size: float, step_size_relative_error: float) -> float:
         """Return the error of a step value that is the exponential of the step size.
 
-        See ``StepFamily.compute_field_value_error``.
+        See ``LoadingStepFamily.compute_field_value_error``.
         """
         return math.exp(self.sign * step_size) * step_size * step_size_relative_error
 
@@ -344,7 +344,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
         step. An approximate root of the misfit, and the slope of the misfit at the root, are
         computed first with a loose tolerance. One to three paths are then integrated for each
         smaller tolerance. If the scene has several states, there are no critical paths. See
-        ``StepFamily.find_sizes_by_critical_path``.
+        ``LoadingStepFamily.iterate_sizes_by_critical_path``.
         """
         path_at = self.build_critical_path_factory(integrator)
         loose = (
@@ -383,7 +383,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
 
         The method searches for the smallest step after which an orbit that touches the instability
         norm does not shrink. The computation of each misfit requires the integration of one orbit.
-        See ``StepFamily.find_sizes_by_limit_cycle``.
+        See ``LoadingStepFamily.iterate_sizes_by_limit_cycle``.
         """
         found, path_at = dict[float, float](), self.build_critical_path_factory(integrator)
 

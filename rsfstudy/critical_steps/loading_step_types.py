@@ -71,7 +71,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
         """Return a function that computes the critical path after a step.
 
         The step size changes only the load point velocity of the critical path. See
-        ``ShootingStepFamily.build_critical_path_factory``.
+        ``LoadingStepFamilySolvedByShooting.build_critical_path_factory``.
         """
         path = CriticalPath.from_scene(self.scene, integrator)
         return lambda size: path.with_load_velocity(self.step_size_to_field_value(size))
@@ -79,7 +79,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the velocity ratio V_0/V_* of a step of a given size.
 
-        See ``StepFamily.step_size_to_field_value``.
+        See ``LoadingStepFamily.step_size_to_field_value``.
         """
         return math.exp(self.sign * step_size)
 
@@ -144,14 +144,14 @@ class DisplacementStepFamily(LoadingStepFamily):
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the displacement of a step of a given size, in units of D_c.
 
-        See ``StepFamily.step_size_to_field_value``.
+        See ``LoadingStepFamily.step_size_to_field_value``.
         """
         return self.sign * step_size
 
     def compute_field_value_error(self, step_size: float, step_size_relative_error: float) -> float:
         """Return the error of the displacement, in units of D_c.
 
-        See ``StepFamily.compute_field_value_error``.
+        See ``LoadingStepFamily.compute_field_value_error``.
         """
         return step_size * step_size_relative_error
 
@@ -161,7 +161,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         If the scene has inertia, the slider follows the critical path with a delay, which changes
         the critical step size in two ways. The load point moves during the delay, and the state
         evolves less because the slip rate is lower. The effect on the state is b/2 times the slip
-        by which the slider is delayed. See ``StepFamily.inertia_shifts_critical_size``.
+        by which the slider is delayed. See ``LoadingStepFamily.inertia_shifts_critical_size``.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -178,7 +178,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         """Return True if steady sliding is stable after every smaller step.
 
         A displacement step does not change the stability of steady sliding. See
-        ``StepFamily.motions_after_smaller_steps_decay``.
+        ``LoadingStepFamily.motions_after_smaller_steps_decay``.
         """
         return is_linearly_stable(self.scene)
 
@@ -188,7 +188,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         The first step is the critical step. The second step has the displacement D_c a/(b - a),
         which is the closed form of the critical step (eq. 13 of doi:10.1007/s11589-014-0098-4). The
         slip rate is infinite if it exceeds the floating-point range. See
-        ``StepFamily.extra_output_values``.
+        ``LoadingStepFamily.compute_extra_output_values``.
         """
 
         def after(step: float) -> float:
@@ -210,7 +210,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         A displacement step changes only the spring stress, and the state Psi remains zero. The
         critical step therefore follows from the point of the critical path at which Psi is zero,
         and each tolerance needs only one integration. See
-        ``StepFamily.find_sizes_by_critical_path``.
+        ``LoadingStepFamily.iterate_sizes_by_critical_path``.
         """
         path, sign = CriticalPath.from_scene(self.scene, integrator), self.sign
         for tolerance in local_tolerances:
@@ -279,7 +279,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the change in normal stress of a step, in units of sigma_*.
 
-        See ``StepFamily.step_size_to_field_value``.
+        See ``LoadingStepFamily.step_size_to_field_value``.
         """
         return math.expm1(self.sign * step_size)
 
@@ -288,7 +288,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
 
         If the scene has inertia, the slip rate rises with a delay after the step. The effect of
         inertia on the critical step size depends on the slip rate immediately after the step. See
-        ``StepFamily.inertia_shifts_critical_size``.
+        ``LoadingStepFamily.inertia_shifts_critical_size``.
         """
         scene = self.scene
         behind = (
@@ -311,7 +311,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
 
         The error follows from two facts: the critical stiffness is proportional to normal stress,
         and the step size is the logarithm of normal stress. See
-        ``StepFamily.size_error_if_neutrally_stable``.
+        ``LoadingStepFamily.estimate_error_near_neutral_stability``.
         """
         scene = self.build_scene_with_step(step_size)
         near = (
@@ -323,7 +323,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
     def compute_extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the slip rate immediately after the critical step.
 
-        The slip rate is in units of V_*. See ``StepFamily.extra_output_values``.
+        The slip rate is in units of V_*. See ``LoadingStepFamily.compute_extra_output_values``.
         """
         rate = (
             math.nan

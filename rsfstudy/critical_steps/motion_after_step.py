@@ -1,6 +1,7 @@
 """Motion after a step, and its peak slip rate relative to the instability norm.
 
-The main functions are ``motion_reaches_norm`` and ``compute_excess_over_instability_norm``.
+The main functions are ``motion_reaches_instability_norm`` and
+``compute_log_rate_excess_over_norm``.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class _OrbitOutcome:
     ----------
     log_slip_rate_peaks : tuple of float
         Values of ln V at the peaks of ln V.
-    reached_norm : bool
+    reached_instability_norm : bool
         True if the motion has reached the instability norm.
     point_where_growth_was_too_slow : MotionPoint, optional
         Peak of ln V at which the integration ended because the orbit grows too slowly.
@@ -88,7 +89,7 @@ def motion_reaches_instability_norm(scene: Scene, integrator: Integrator) -> boo
     Returns
     -------
     bool
-        True if ``compute_excess_over_instability_norm`` is not negative.
+        True if ``compute_log_rate_excess_over_norm`` is not negative.
     """
     return compute_log_rate_excess_over_norm(scene, integrator) >= 0.0
 

@@ -1,6 +1,6 @@
 """Peak slip rate of a motion with a held load point.
 
-The main function is ``compute_peak_excess_over_instability_norm``. Spring stress can only decrease
+The main function is ``compute_peak_log_rate_excess_over_norm``. Spring stress can only decrease
 while the load point is held. With one state variable, ln V has only one peak, because the weakening
 of friction with slip becomes slower and slower after the first peak.
 

@@ -35,7 +35,7 @@ class SteadySlidingWithStabilityMargin(SteadySliding):
 
     @cached_property
     def stability_margin(self) -> float:
-        """Stability margin of steady sliding. See the function ``stability_margin``.
+        """Stability margin of steady sliding. See the function ``compute_stability_margin``.
 
         The margin is computed at the first access, because the outcome of most motions does not
         depend on the margin.

@@ -1,8 +1,9 @@
 """Computation of cells, in this process or in a worker process.
 
 ``compute_cell`` computes a single cell. If the computation of a cell raises an exception, the
-exception is recorded as the outcome of the cell. ``compute_serially`` computes all cells in this
-process, and ``compute_batch`` computes a batch of cells in a worker process.
+exception is recorded as the outcome of the cell. ``compute_cell_batches_serially`` computes all
+cells in this process, and ``compute_packed_cell_batch`` computes a batch of cells in a worker
+process.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ class SharedCellSettings:
         Measure of the study. Each cell may change some fields of the measure.
     accuracy : Accuracy
         Accuracy of each cell.
-    time_limit : float, optional
+    cell_cpu_time_limit : float, optional
         CPU time in s that a cell may use on a worker. The default is ``CELL_TIME_LIMIT``. If cells
         are computed in the process of the user, their CPU time is not limited.
     user_parts : tuple of UserPart, default: ()
@@ -111,7 +112,7 @@ def compute_cell_batches_serially(
 
     Parameters
     ----------
-    task : CellTask
+    cell_settings : CellTask
         Scene, measure and accuracy of the cells.
     batches : CellBatchIterator
         Batches of cells to compute.
@@ -150,7 +151,7 @@ def serialize_cell_settings(cell_settings: SharedCellSettings) -> bytes:
 
     Parameters
     ----------
-    task : CellTask
+    cell_settings : CellTask
         Task to serialise.
 
     Returns
@@ -219,7 +220,7 @@ def pack_cell_batch(cell_plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
 
     Parameters
     ----------
-    plan : CellPlan
+    cell_plan : CellPlan
         Plan that contains the cells.
     cell_numbers : ndarray of int
         Numbers of the cells in the batch.
@@ -244,8 +245,8 @@ def compute_packed_cell_batch(serialized_settings: bytes, packed_batch: bytes) -
 
     Parameters
     ----------
-    serialized_task : bytes
-        Result of ``serialize_task``.
+    serialized_settings : bytes
+        Result of ``serialize_cell_settings``.
     packed_batch : bytes
         Result of ``pack_cell_batch``.
 
@@ -297,7 +298,7 @@ def compute_cell(
 
     Parameters
     ----------
-    task : CellTask
+    cell_settings : CellTask
         Scene, measure and accuracy of the cells.
     cell : Cell
         Cell to compute.
@@ -346,7 +347,7 @@ class _CpuTimeLimits:
     The operating system measures the CPU time of the whole process. The limit is therefore
     multiplied by the number of computing threads. The limit is set once per batch instead of once
     per cell. Setting the limit once is sufficient, because a batch starts no further cells once
-    ``_FINISHED_CELLS_HANDOVER_INTERVAL`` has passed. Only the last cell of a batch can therefore
+    ``_SECONDS_BETWEEN_JOURNAL_TRANSFERS`` has passed. Only the last cell of a batch can therefore
     run for a long time.
     """
 

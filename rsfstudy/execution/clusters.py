@@ -118,7 +118,7 @@ def _wrap_unregister_for_unknown_names(unregister: Callable[..., None]) -> Any:
 
 
 def _tolerate_lost_resource_tracker() -> None:
-    """Install ``_ignore_unknown_names_in_unregister`` until the process ends.
+    """Install ``_wrap_unregister_for_unknown_names`` until the process ends.
 
     The wrapper must stay installed, because semaphores are released whenever they are
     garbage-collected.

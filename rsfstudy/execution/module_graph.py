@@ -1,10 +1,10 @@
 """Import graph and code digests of the rsfstudy modules.
 
 The results of a cell depend on the modules that the measure and the parts of the scene import,
-directly or indirectly. ``ModuleGraph`` finds these modules by reading the source files and computes
-one digest per module. The modules are not imported. Docstrings, comments and imports for type
-annotations do not affect the digests. If a package exports its names lazily, an import from the
-package is treated as an import from the modules that define the imported names.
+directly or indirectly. ``ModuleImportGraph`` finds these modules by reading the source files and
+computes one digest per module. The modules are not imported. Docstrings, comments and imports for
+type annotations do not affect the digests. If a package exports its names lazily, an import from
+the package is treated as an import from the modules that define the imported names.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class ModuleImportGraph:
 
         Parameters
         ----------
-        roots : iterable of str, optional
+        root_modules : iterable of str, optional
             Full names of modules. The function computes the digests of these modules and of all
             modules that they import directly or indirectly. Modules without source files are
             ignored. By default, the function computes the digests of all modules.

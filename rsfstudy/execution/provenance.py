@@ -1,8 +1,8 @@
 """Provenance of results.
 
-The function ``run_fingerprint`` collects the fingerprint, which contains all settings, versions and
-code digests that affect the results. The function ``collect_provenance`` collects the provenance,
-which contains the fingerprint, the time, the command, the commit and the machine.
+The function ``collect_run_fingerprint`` collects the fingerprint, which contains all settings,
+versions and code digests that affect the results. The function ``collect_provenance`` collects the
+provenance, which contains the fingerprint, the time, the command, the commit and the machine.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def digest_reachable_modules(measure: Measure, example_scenes: Iterable[Scene]) 
     ----------
     measure : Measure
         Measure of the study.
-    scenes : iterable of Scene
+    example_scenes : iterable of Scene
         One scene for each combination of slider parts.
 
     Returns
@@ -141,7 +141,7 @@ def collect_run_fingerprint(study: Study, example_scenes: Iterable[Scene]) -> di
     ----------
     study : Study
         Study to run.
-    scenes : iterable of Scene
+    example_scenes : iterable of Scene
         One scene for each combination of slider parts in the lattice.
 
     Returns
@@ -174,7 +174,7 @@ def collect_provenance(
         Study to run.
     command_line : str
         Command line or Python call of the user.
-    scenes : iterable of Scene
+    example_scenes : iterable of Scene
         One scene for each combination of slider parts in the lattice.
 
     Returns
@@ -279,12 +279,12 @@ def read_git_commit_and_state(checkout_directory: Path) -> str:
 def find_engine_package_versions(engine_name: str) -> dict[str, str]:
     """Return the versions of the additional packages that an engine requires.
 
-    The versions of NumPy and SciPy are not included, because ``code_fingerprint`` adds these
-    versions for all engines.
+    The versions of NumPy and SciPy are not included, because ``collect_code_fingerprint`` adds
+    these versions for all engines.
 
     Parameters
     ----------
-    name : str
+    engine_name : str
         Name of the engine.
 
     Returns

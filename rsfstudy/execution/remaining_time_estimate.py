@@ -44,7 +44,7 @@ class RemainingTimeEstimator:
 
         Parameters
         ----------
-        cell_count : int
+        remaining_cell_count : int
             Number of cells that are not finished.
 
         Returns

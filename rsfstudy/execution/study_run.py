@@ -100,7 +100,7 @@ class StudyRun:
         Study to run.
     options : OutputOptions
         Output files, and handling of failed cells.
-    task : CellTask
+    cell_settings : CellTask
         Scene, measure and accuracy of the cells.
     workers : int, default: 1
         Number of cells that are computed at the same time. The sizes of the batches depend on this
@@ -189,8 +189,8 @@ class StudyRun:
         Parameters
         ----------
         cell_batch_mapper : callable
-            Function that computes the cells: ``cell_computation.compute_serially``, or the result
-            of ``worker_pool.make_dask_batch_mapper``.
+            Function that computes the cells: ``cell_computation.compute_cell_batches_serially``, or
+            the result of ``worker_pool.make_dask_batch_mapper``.
         progress_callback : callable
             Function that is called with the number of finished cells, the number of all cells, and
             the estimated remaining time.

@@ -23,9 +23,9 @@ def prepare_study_run(
     ----------
     study : Study
         Study to run.
-    options : OutputOptions
+    output_options : OutputOptions
         Output files and handling of failed cells.
-    workers : WorkerPool
+    worker_pool : WorkerPool
         Workers that compute the cells.
 
     Returns

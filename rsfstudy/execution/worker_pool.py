@@ -151,8 +151,8 @@ class WorkerPool(contextlib.ExitStack):
         Returns
         -------
         callable
-            Function that takes a ``CellTask`` and a ``CellBatchIterator``, and yields finished
-            cells.
+            Function that takes a ``SharedCellSettings`` and a ``CellBatchIterator``, and yields
+            finished cells.
         """
         if self.client is not None:
             return make_dask_batch_mapper(self.client)
@@ -198,7 +198,8 @@ def make_dask_batch_mapper(
     Returns
     -------
     callable
-        Function that takes a ``CellTask`` and a ``CellBatchIterator``, and yields finished cells.
+        Function that takes a ``SharedCellSettings`` and a ``CellBatchIterator``, and yields
+        finished cells.
     """
 
     def map_cells(

@@ -24,7 +24,7 @@ _WARNINGS_OF_THREAD = threading.local()
 
 
 def redirect_warnings_to_browser_page() -> None:
-    """Send warnings to ``collected_warnings`` instead of the terminal.
+    """Send warnings to ``collect_warnings_of_thread`` instead of the terminal.
 
     The server calls this function once. In a notebook, the function is not called, and warnings are
     displayed as usual.
@@ -48,7 +48,7 @@ def collect_warnings_of_thread() -> Iterator[list[str]]:
     Yields
     ------
     list of str
-        Messages, if the server has called ``route_warnings_to_pages``.
+        Messages, if the server has called ``redirect_warnings_to_browser_page``.
     """
     _WARNINGS_OF_THREAD.messages = []
     try:
@@ -132,9 +132,9 @@ class BackgroundJobs:
         compute : callable
             Function that takes a function ``report(fraction, text)`` and returns the result. The
             function may call ``report`` to move the progress bar.
-        deliver : callable
+        on_result : callable
             Function that receives the result, in the thread of the page.
-        fail : callable
+        on_error : callable
             Function that receives an exception of the computation, in the thread of the page.
         label : str, optional
             Text next to the progress bar.

@@ -42,9 +42,10 @@ class ExplorerView(ABC):
     """Base class that adds code, downloads and messages to the widgets of a view.
 
     A subclass creates its widgets in ``__init__``, and implements the abstract methods. The
-    subclass calls ``refresh`` after each change to its widgets. To handle errors of computations,
-    the subclass calls ``show_error`` or uses the context manager ``errors_shown``. The methods
-    ``figure``, ``table`` and ``dataset`` are called when the user downloads a file.
+    subclass calls ``update_code_and_url`` after each change to its widgets. To handle errors of
+    computations, the subclass calls ``show_error`` or uses the context manager
+    ``show_raised_errors``. The methods ``draw_figure_for_download``, ``build_table_for_download``
+    and ``build_dataset_for_download`` are called when the user downloads a file.
 
     Parameters
     ----------
@@ -109,11 +110,11 @@ class ExplorerView(ABC):
 
     @abstractmethod
     def set_widget_state(self, widget_state: Mapping[str, Any]) -> None:
-        """Set the widgets to the settings that ``state`` returned.
+        """Set the widgets to the settings that ``widget_state`` returned.
 
         Parameters
         ----------
-        state : mapping of str to object
+        widget_state : mapping of str to object
             Settings. Missing settings keep their values.
 
         Raises
@@ -149,7 +150,7 @@ class ExplorerView(ABC):
         Returns
         -------
         matplotlib.figure.Figure
-            Figure drawn by the functions of ``rsfstudy.plots``.
+            Figure drawn by the functions of ``rsfstudy.list_plot_panes``.
         """
 
     @abstractmethod
@@ -192,8 +193,8 @@ class ExplorerView(ABC):
         ----------
         source : object
             Object that the view shows.
-        state : mapping of str to object
-            Settings that ``state`` returned. The mapping may be empty.
+        widget_state : mapping of str to object
+            Settings that ``widget_state`` returned. The mapping may be empty.
 
         Returns
         -------
@@ -212,7 +213,7 @@ class ExplorerView(ABC):
 
         Parameters
         ----------
-        text : str or None
+        state_json : str or None
             Settings as JSON.
 
         Returns

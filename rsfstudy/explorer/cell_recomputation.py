@@ -38,7 +38,7 @@ class RecomputedCell:
 
     Parameters
     ----------
-    number : int
+    cell_number : int
         Number of the cell in row-major order.
     scene : Scene
         Scene of the cell.
@@ -46,9 +46,9 @@ class RecomputedCell:
         Results of the measure.
     motion : xarray.Dataset
         Motion of the cell.
-    note : str
+    motion_explanation : str
         Explanation of the motion.
-    code : str
+    motion_code : str
         Python statement that computes the motion.
     """
 
@@ -67,7 +67,7 @@ def find_cell_coordinates(results: xr.Dataset, cell_number: int) -> dict[str, An
     ----------
     results : xarray.Dataset
         Results of a study.
-    number : int
+    cell_number : int
         Number of the cell in row-major order.
 
     Returns
@@ -98,9 +98,9 @@ def recompute_cell_and_motion(
     ----------
     results : xarray.Dataset
         Results of a study.
-    number : int
+    cell_number : int
         Number of the cell in row-major order.
-    report : callable
+    report_progress : callable
         Function that receives the progress as a fraction and a text.
 
     Returns
@@ -174,7 +174,7 @@ def tabulate_recomputed_outcome(
 
     Parameters
     ----------
-    cell : RecomputedCell
+    recomputed_cell : RecomputedCell
         Cell that was computed again.
     results : xarray.Dataset
         Results of the study.
@@ -210,7 +210,7 @@ def draw_motion_figures(motion: xr.Dataset, figure_height: int = 240) -> list[An
     ----------
     motion : xarray.Dataset
         Simulated or recorded motion.
-    height : int, default: 240
+    figure_height : int, default: 240
         Height of a figure in pixels.
 
     Returns

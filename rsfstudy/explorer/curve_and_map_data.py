@@ -31,16 +31,16 @@ class CurveData:
 
     Parameters
     ----------
-    name : str
+    label : str
         Point of the curve on the colour dimension. The string is empty for a single curve.
-    number : int
+    point_index : int
         Index of this point.
-    x, y, error : ndarray
-        Coordinates, values and error estimates. If the variable has no error estimate, ``error``
+    x, y, y_error : ndarray
+        Coordinates, values and error estimates. If the variable has no error estimate, ``y_error``
         contains NaN.
-    status : ndarray of int
+    status_codes : ndarray of int
         Status codes of the cells. The code is ``Status.OK`` if a point belongs to no cell.
-    cells : ndarray of int
+    cell_numbers : ndarray of int
         Numbers of the cells in row-major order, or -1 if a point belongs to no cell.
     """
 
@@ -61,9 +61,9 @@ class MapData:
     ----------
     x, y : ndarray
         Coordinates of the cells along both axes, in increasing order.
-    values, status : ndarray, shape (y, x)
+    values, status_codes : ndarray, shape (y, x)
         Values and status codes of the cells.
-    cells : ndarray of int, shape (y, x)
+    cell_numbers : ndarray of int, shape (y, x)
         Numbers of the cells in row-major order, or -1 if a point belongs to no cell.
     """
 
@@ -224,7 +224,7 @@ def choose_drawn_point_indices(
     ----------
     values : ndarray, shape (n,)
         Values of the curve.
-    status : ndarray of int, shape (n,), optional
+    status_codes : ndarray of int, shape (n,), optional
         Status codes of the points.
 
     Returns
@@ -278,12 +278,12 @@ def sample_map_at_pixels(
 
     Parameters
     ----------
-    found : Map
+    map_data : Map
         Map to sample.
     x_range, y_range : tuple of (float, float)
         Limits of the image. If the points of an axis are spaced logarithmically, the pixels are
         spaced logarithmically.
-    shape : tuple of (int, int)
+    pixel_shape : tuple of (int, int)
         Number of pixels along y and along x.
 
     Returns
@@ -309,9 +309,9 @@ class StatusMarks(NamedTuple):
 
     Parameters
     ----------
-    rows, columns : ndarray of int
+    row_indices, column_indices : ndarray of int
         Index of the curve and index along the curve, or indices of a map along y and x.
-    status, cells : ndarray of int
+    status_codes, cell_numbers : ndarray of int
         Status codes and cell numbers.
     """
 
@@ -330,7 +330,7 @@ def find_cells_to_mark(status_codes: np.ndarray, cell_numbers: np.ndarray) -> St
 
     Parameters
     ----------
-    status, cells : ndarray of int, shape (rows, columns)
+    status_codes, cell_numbers : ndarray of int, shape (rows, columns)
         Status codes and cell numbers.
 
     Returns

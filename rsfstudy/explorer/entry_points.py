@@ -72,7 +72,7 @@ def serve(
         Port of the server. The default is 8067, or a free port if that port is in use.
     open_browser : bool, default: True
         If True, the page is opened in the browser.
-    announce : callable, default: print
+    announce_address : callable, default: print
         Function that receives the first address of the page.
 
     Raises

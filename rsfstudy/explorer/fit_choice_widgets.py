@@ -90,7 +90,7 @@ def describe_loading_step(step_number: int, step: LoadingStep) -> str:
 
     Parameters
     ----------
-    number : int
+    step_number : int
         Number of the step, starting from 1.
     step : LoadingStep
         Step of load point velocity or normal stress.

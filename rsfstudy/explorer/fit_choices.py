@@ -79,7 +79,7 @@ class FitChoices:
 
         Parameters
         ----------
-        state : mapping of str to object
+        widget_state : mapping of str to object
             Values by name, with lists instead of tuples.
 
         Returns
@@ -128,7 +128,7 @@ class FitChoices:
 
         Parameters
         ----------
-        reading_arguments : dict of str to object
+        build_read_record_arguments : dict of str to object
             Arguments of ``rsfstudy.read_record``.
 
         Returns
@@ -179,7 +179,7 @@ class FitChoices:
         ----------
         steps : sequence of LoadingStep
             Steps in the window.
-        time : float
+        excluded_time : float
             Time in s.
 
         Returns
@@ -272,7 +272,7 @@ def parse_column_headings(heading_assignments: str) -> dict[str, str]:
 
     Parameters
     ----------
-    text : str
+    heading_assignments : str
         Comma-separated assignments such as "time=t (s), friction=mu".
 
     Returns

@@ -26,7 +26,7 @@ class SliderRange(NamedTuple):
         Smallest and largest value.
     is_logarithmic : bool
         True if equal distances on the slider are equal ratios of the value.
-    is_whole : bool
+    has_only_whole_numbers : bool
         True if all values are whole numbers.
     """
 
@@ -43,13 +43,13 @@ class SliderRange(NamedTuple):
 
         Parameters
         ----------
-        default : float
+        default_value : float
             Default value, which is 0 if the field is optional.
-        typical : float
+        typical_value : float
             Positive value in the middle of the range.
         rule : str
             Rule that the values satisfy, as the part declares it.
-        scale : str
+        scale_name : str
             Scale of the field, such as "D_c/V_*", or an empty string.
 
         Returns

@@ -22,7 +22,7 @@ def thin_curve_to_pixels(
         because of noise, the row belongs to the pixel of the largest earlier coordinate.
     y : ndarray, shape (rows,)
         Vertical coordinates without NaN.
-    limits : (float, float)
+    x_limits : (float, float)
         Visible range of ``x``.
     pixel_count : int
         Number of pixels between the limits.

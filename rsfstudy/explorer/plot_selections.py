@@ -137,7 +137,7 @@ def complete_selection(
     dataset : xarray.Dataset
         Results of a study.
     variable, kind, x, second, facet : str, optional
-        Requested choices, as in ``Selection``.
+        Requested choices, as in ``PlotSelection``.
     points : mapping of str to int, optional
         Requested indices on the remaining dimensions.
 

@@ -58,7 +58,7 @@ def find_hold_intervals(loading_steps: Sequence[LoadingStep]) -> list[tuple[floa
 
     Parameters
     ----------
-    steps : sequence of LoadingStep
+    loading_steps : sequence of LoadingStep
         Steps of a record.
 
     Returns
@@ -115,7 +115,7 @@ class RecordPlot:
         ----------
         record : Record
             Whole record.
-        x_name : {"time", "displacement"}
+        x_column_name : {"time", "displacement"}
             Column on the horizontal axis.
         """
         self._record, self._x_name = record, x_column_name
@@ -152,7 +152,7 @@ class RecordPlot:
         ----------
         steps : sequence of LoadingStep
             Steps in the window.
-        excluded : sequence of int
+        excluded_step_numbers : sequence of int
             Numbers of the steps that are not fitted, starting from 1.
         """
         self._step_times = np.array([step.middle for step in steps])
@@ -178,7 +178,7 @@ class RecordPlot:
 
         Parameters
         ----------
-        dataset : xarray.Dataset or None
+        fit_dataset : xarray.Dataset or None
             Dataset from ``rsfstudy.fit``. With None, the curves are removed.
         """
         self._fitted = [] if fit_dataset is None else [*_iterate_fit_curves_and_styles(fit_dataset)]

@@ -300,10 +300,12 @@ class RecordView(ExplorerView):
         )
         if path or reading:
             lines.append(
-                f"record = {format_python_call('rsfstudy.read_record', format_values_as_python_code(reading), source)}"
+                "record = "
+                f"{format_python_call('rsfstudy.read_record', format_values_as_python_code(reading), source)}"
             )
         lines.append(
-            f"fit = {format_python_call('rsfstudy.fit', format_values_as_python_code(fitting), 'record')}"
+            "fit = "
+            f"{format_python_call('rsfstudy.fit', format_values_as_python_code(fitting), 'record')}"
         )
         return "\n".join([*lines, "print(fit.rsf.fit_table().T)"])
 

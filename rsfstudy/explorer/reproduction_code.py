@@ -66,11 +66,11 @@ def write_selection_as_python_code(
         Results of a study, in the units of the plot.
     selection : Selection
         Selection to reproduce.
-    file : str
+    results_path : str
         Path of the results. If the string is empty, the results were not read from a file.
-    cell : RecomputedCell or None
+    recomputed_cell : RecomputedCell or None
         Cell that was computed again.
-    cell_place : mapping of str to object, or None
+    cell_coordinates : mapping of str to object, or None
         Coordinates of this cell.
 
     Returns
@@ -120,11 +120,11 @@ def write_selection_as_shell_commands(
     ----------
     selection : Selection
         Selection to reproduce.
-    file : str
+    results_path : str
         Path of the results. If the string is empty, the results were not read from a file.
-    state : str
+    widget_state_json : str
         Settings of the view as JSON.
-    cell_place : mapping of str to object, or None
+    cell_coordinates : mapping of str to object, or None
         Coordinates of the chosen cell.
 
     Returns

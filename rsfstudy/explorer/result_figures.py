@@ -247,7 +247,7 @@ class CurvesPlot(ResultPlot):
                     return
 
     def update_data(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
-        """Replace the data of the plot. See ``Plot.update``."""
+        """Replace the data of the plot. See ``ResultPlot.update_data``."""
         super().update_data(dataset, panel)
         curves = extract_curves_of_panel(dataset, panel)
         styles = _choose_curve_styles(dataset, panel, curves)
@@ -376,7 +376,7 @@ class MapPlot(ResultPlot):
         self.on_cell(cell)
 
     def update_data(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
-        """Replace the data of the plot. See ``Plot.update``."""
+        """Replace the data of the plot. See ``ResultPlot.update_data``."""
         super().update_data(dataset, panel)
         self.map = found = extract_map_of_panel(dataset, panel)
         values, (x, y) = _convert_map_to_image(found)

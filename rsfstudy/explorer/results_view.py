@@ -337,13 +337,13 @@ class ResultsView(ExplorerView):
     # ---- state, code and downloads --------------------------------------------------------------
 
     def get_widget_state(self) -> dict[str, Any]:
-        """Return the selection and the cell. See ``View.state``."""
+        """Return the selection and the cell. See ``ExplorerView.get_widget_state``."""
         choices = {name: getattr(self.selection, name) for name in _SELECTION_FIELD_NAMES}
         state = choices | {"points": dict(self.selection.points)}
         return state | ({"cell": self._cell_number} if self._cell_number >= 0 else {})
 
     def set_widget_state(self, widget_state: Mapping[str, Any]) -> None:
-        """Set the selection and the cell. See ``View.set_state``."""
+        """Set the selection and the cell. See ``ExplorerView.set_widget_state``."""
         known = (*_SELECTION_FIELD_NAMES, "points", "cell")
         for name in widget_state:
             if name not in known:
@@ -358,13 +358,13 @@ class ResultsView(ExplorerView):
             self._start_cell_recomputation(number)
 
     def write_python_code(self) -> str:
-        """Return code that prints the numbers of the plot. See ``View.python_code``."""
+        """Return code that prints the numbers of the plot. See ``ExplorerView.write_python_code``."""
         return write_selection_as_python_code(
             self.shown, self.selection, self.file, self.cell, self._find_chosen_cell_coordinates()
         )
 
     def write_command_line(self) -> str:
-        """Return commands that export the results. See ``View.command_line``."""
+        """Return commands that export the results. See ``ExplorerView.write_command_line``."""
         return write_selection_as_shell_commands(
             self.selection, self.file, self.widget_state_json, self._find_chosen_cell_coordinates()
         )
@@ -375,13 +375,13 @@ class ResultsView(ExplorerView):
         return find_cell_coordinates(self.results, number) if number >= 0 else None
 
     def draw_figure_for_download(self) -> Figure:
-        """Return the figure of the open tab. See ``View.figure``."""
+        """Return the figure of the open tab. See ``ExplorerView.draw_figure_for_download``."""
         if self._tabs.active == 1:
             return draw_figure(self.results)
         return draw_figure_of_selection(self.shown, self.selection)
 
     def build_table_for_download(self) -> pd.DataFrame:
-        """Return the numbers of the plot. See ``View.table``."""
+        """Return the numbers of the plot. See ``ExplorerView.build_table_for_download``."""
         part = self.build_dataset_for_download()
         kept = {*map(str, part.data_vars), *map(str, part.dims), *self.selection.points}
         kept |= {self.selection.x}
@@ -392,7 +392,7 @@ class ResultsView(ExplorerView):
         return table
 
     def build_dataset_for_download(self) -> xr.Dataset:
-        """Return the results that the plot shows. See ``View.dataset``."""
+        """Return the results that the plot shows. See ``ExplorerView.build_dataset_for_download``."""
         names = list_shown_variable_names(self.shown, self.selection)
         return self.shown[names].isel(dict(self.selection.points))
 

@@ -176,7 +176,10 @@ class SceneControls:
         scale = QUANTITY_BY_SCENE_FIELD[field_name].scale
         if self._rig is None or not scale:
             return value
-        return f"{value * convert_scale_to_display_units(self._rig, scale):.4g} {DISPLAY_UNITS_BY_SCALE[scale]}"
+        return (
+            f"{value * convert_scale_to_display_units(self._rig, scale):.4g} "
+            f"{DISPLAY_UNITS_BY_SCALE[scale]}"
+        )
 
     def _convert_settings_to_units(self, units: str) -> None:
         """Express the scene in rig units or in dimensionless form."""

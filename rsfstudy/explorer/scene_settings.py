@@ -70,8 +70,8 @@ class SceneSettings:
 
         Parameters
         ----------
-        state : mapping of str to object
-            State that ``as_state`` returned.
+        widget_state : mapping of str to object
+            State that ``as_widget_state`` returned.
 
         Returns
         -------
@@ -206,7 +206,8 @@ class SceneSettings:
         rig_argument = ", rig" if self.rig else ""
         if self.rig:
             lines.append(
-                f"rig = {format_python_call('rsfstudy.Rig', format_values_as_python_code(self.rig))}"
+                "rig = "
+                f"{format_python_call('rsfstudy.Rig', format_values_as_python_code(self.rig))}"
             )
         if self.protocol:
             lines.insert(0, "from pathlib import Path\n")

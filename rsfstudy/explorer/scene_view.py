@@ -52,9 +52,9 @@ class ComputedMotion(NamedTuple):
         Scene of the motion.
     motion : xarray.Dataset
         Dimensionless motion.
-    shown : xarray.Dataset
+    displayed_motion : xarray.Dataset
         Motion in the units of the page.
-    summary : list
+    tables_and_sentences : list
         Tables and sentences about the motion.
     """
 

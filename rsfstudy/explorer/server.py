@@ -88,7 +88,7 @@ class ExplorerServer:
         ----------
         open_browser : bool
             If True, the page is opened in the browser.
-        announce : callable
+        announce_address : callable
             Function that receives the first address when the server is ready.
         """
         redirect_warnings_to_browser_page()

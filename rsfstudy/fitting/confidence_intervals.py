@@ -50,7 +50,7 @@ def compute_student_t_quantile(fit_solution: FitSolution, confidence_level: floa
 
     Parameters
     ----------
-    solution : FitSolution
+    fit_solution : FitSolution
         Solution of a fit.
     confidence_level : float
         Confidence level between 0 and 1.
@@ -74,9 +74,9 @@ def compute_confidence_interval(
 
     Parameters
     ----------
-    problem : FitProblem
+    fit_problem : FitProblem
         Least-squares problem that contains the model of the record.
-    solution : FitSolution
+    fit_solution : FitSolution
         Solution of the least-squares problem.
     parameter_name : str
         Name of a free parameter.
@@ -164,7 +164,7 @@ class LikelihoodProfile:
         ----------
         direction_sign : float
             Direction of the search: -1 for the lower end and 1 for the upper end.
-        stderr_count : float
+        distance_in_stderrs : float
             Distance between the best value and the end of the interval, in standard errors.
 
         Returns
@@ -203,7 +203,7 @@ class LikelihoodProfile:
 
         Parameters
         ----------
-        coordinate : float
+        fit_coordinate : float
             Value of the parameter. For a slip distance or a stiffness, the coordinate is the
             logarithm of the parameter.
 

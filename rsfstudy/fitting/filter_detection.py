@@ -59,8 +59,8 @@ def detect_unspecified_filter(
         Result of a fit without a filter.
     time : ndarray, shape (rows,)
         Times in s.
-    noise : str
-        Noise model (see ``rsfstudy.fitting.noise.fit_noise``).
+    noise_model_name : str
+        Noise model (see ``rsfstudy.fitting.noise_model_name.fit_noise_model``).
 
     Returns
     -------

@@ -117,7 +117,7 @@ class FitProblem:
     free_parameters : sequence of str
         Names of the free parameters.
     noise_model_name : str
-        Noise model (see ``rsfstudy.fitting.noise.fit_noise``).
+        Noise model (see ``rsfstudy.fitting.noise.fit_noise_model``).
     stiffness_relative_stderr : float, default: 0.0
         Relative standard error of a fixed stiffness.
 
@@ -182,7 +182,7 @@ class FitProblem:
 
         Parameters
         ----------
-        coordinates : ndarray, shape (parameters,)
+        fit_coordinates : ndarray, shape (parameters,)
             Coordinates of the free parameters.
 
         Returns
@@ -200,7 +200,7 @@ class FitProblem:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
 
         Returns
@@ -222,7 +222,7 @@ class FitProblem:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
         require_stable : bool, default: False
             If True, the motion is computed only if the stiffness exceeds the critical stiffness.
@@ -357,9 +357,9 @@ class FitProblem:
 
         Parameters
         ----------
-        initial_coordinates : ndarray, shape (parameters,)
+        initial_fit_coordinates : ndarray, shape (parameters,)
             Initial coordinates.
-        noise : NoiseModel
+        noise_model : NoiseModel
             Noise model that whitens the residuals.
         cost_tolerance : float, optional
             Relative tolerance of the sum of squares. The default is 1e-8.
@@ -643,9 +643,9 @@ def _has_converged(
 
     Parameters
     ----------
-    last_coordinate_change : ndarray, shape (parameters,)
+    last_fit_coordinate_change : ndarray, shape (parameters,)
         Last change in the coordinates of the free parameters.
-    whitened_jacobian : ndarray, shape (rows, parameters + 1)
+    whitened_jacobian_and_residuals : ndarray, shape (rows, parameters + 1)
         Whitened derivatives, followed by the whitened residuals.
     tolerance : float
         Largest change in the coordinate of a parameter, as a fraction of the standard error of the

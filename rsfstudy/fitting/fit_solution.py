@@ -29,14 +29,14 @@ class FitSolution:
         Values of all parameters, including the fixed parameters.
     free_parameters : tuple of str
         Names of the free parameters.
-    coordinate_covariance : ndarray, shape (parameters, parameters)
+    fit_coordinate_covariance : ndarray, shape (parameters, parameters)
         Covariance matrix of the coordinates of the free parameters.
-    noise_caused_covariance : ndarray, shape (parameters, parameters)
+    fit_coordinate_covariance_from_noise : ndarray, shape (parameters, parameters)
         Contribution of the friction noise to the covariance matrix.
-    stiffness_caused_covariance : ndarray, shape (parameters, parameters)
+    fit_coordinate_covariance_from_stiffness : ndarray, shape (parameters, parameters)
         Contribution of the standard error of a fixed stiffness to the covariance matrix. The
         remaining contribution is due to noise in the load point displacement.
-    numerical_errors : dict of {str: float}
+    parameter_numerical_errors : dict of {str: float}
         Numerical errors of the free parameters.
     noise_model : NoiseModel
         Noise model of the record.
@@ -155,7 +155,7 @@ def compute_aic(
     ----------
     whitened_residuals : ndarray, shape (kept rows,)
         Whitened residuals without outliers.
-    noise : NoiseModel
+    noise_model : NoiseModel
         Noise model that whitened the residuals.
     parameter_count : int
         Number of parameters of the model.

@@ -47,7 +47,7 @@ def find_reasons_for_invalid_stderrs(
 
     Parameters
     ----------
-    solution : FitSolution
+    fit_solution : FitSolution
         Result of the fit.
     recorded_friction : ndarray, shape (rows,)
         Recorded friction.
@@ -78,7 +78,7 @@ def describe_asymmetric_confidence_intervals(
 
     Parameters
     ----------
-    solution : FitSolution
+    fit_solution : FitSolution
         Result of the fit.
     interval_ends : mapping of str to (float, float)
         Ends of the 95 % confidence intervals of the free parameters.
@@ -168,7 +168,7 @@ def is_friction_rounding_too_coarse(fit_solution: FitSolution) -> bool:
 
     Parameters
     ----------
-    solution : FitSolution
+    fit_solution : FitSolution
         Result of the fit.
 
     Returns
@@ -210,9 +210,9 @@ def describe_load_point_noise(
 
     Parameters
     ----------
-    solution : FitSolution
+    fit_solution : FitSolution
         Result of the fit.
-    loading : {"steps", "recorded"}
+    loading_kind : {"steps", "recorded"}
         Loading of the model (see ``rsfstudy.fitting.Fit``).
     displacement_noise_sd : float
         Standard deviation of the load point noise in um.
@@ -278,7 +278,7 @@ def find_unidentified_parameters(
 
     Parameters
     ----------
-    solution : FitSolution
+    fit_solution : FitSolution
         Result of the fit.
     displacement_per_row : float
         Load point displacement in um between successive rows after the step.
@@ -312,13 +312,13 @@ def describe_unidentified_parameters(
 
     Parameters
     ----------
-    solution : FitSolution
+    fit_solution : FitSolution
         Result of the fit.
     parameter_names : tuple of str
         Names of the unconstrained parameters.
     displacement_per_row : float
         Load point displacement in um between successive rows after the step.
-    is_a_at_bound : bool
+    direct_effect_is_at_bound : bool
         True if the direct effect is at its lower bound.
 
     Returns

@@ -1,7 +1,8 @@
 """Windows of a record around steps, with initial guesses of parameters.
 
 A ``FitWindow`` selects the rows of a record around a step, and creates the model of the selected
-rows. The function ``guess_parameters`` estimates initial parameters from the recorded friction.
+rows. The function ``guess_initial_parameter_values`` estimates initial parameters from the recorded
+friction.
 """
 
 from __future__ import annotations
@@ -441,7 +442,7 @@ def guess_initial_parameter_values(
 
     Parameters
     ----------
-    model : WindowModel
+    window_model : WindowModel
         Model of a window.
     step : LoadingStep
         Step of load point velocity or normal stress in the window.

@@ -72,13 +72,13 @@ class Hold(NamedTuple):
 
     Parameters
     ----------
-    rows_before : ndarray of int
+    steady_rows_before : ndarray of int
         Rows of steady sliding before the hold.
-    stop : LoadingStep
+    stop_step : LoadingStep
         Step at which the load point stops.
-    reload : LoadingStep
+    reload_step : LoadingStep
         Step at which the load point starts again.
-    window_end : float
+    next_step_or_record_end_time : float
         Time in s of the next step, or of the end of the record.
     """
 
@@ -106,9 +106,9 @@ class HoldQuantityEstimate(NamedTuple):
     ----------
     value : float
         Value of the quantity.
-    weights : ndarray, shape (parameters,)
+    coefficient_weights : ndarray, shape (parameters,)
         Derivatives of the quantity with respect to the coefficients.
-    other_variance : float, default: 0.0
+    additional_variance : float, default: 0.0
         Additional variance of the quantity, which does not depend on the coefficients.
     trend_derivative : float, default: 0.0
         Derivative of the quantity with respect to the trend.

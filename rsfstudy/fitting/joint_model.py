@@ -133,9 +133,9 @@ def select_values_of_window(
 
     Parameters
     ----------
-    values : mapping of str to object
+    values_by_parameter_name : mapping of str to object
         Values by parameter name, with or without window numbers.
-    number : int
+    window_number : int
         Number of the window, starting from 1.
 
     Returns
@@ -166,9 +166,9 @@ class JointModel:
 
     Parameters
     ----------
-    models : tuple of WindowModel
+    window_models : tuple of WindowModel
         Models of the windows.
-    stiffness_factors : tuple of float, optional
+    stiffness_ratios_to_first_window : tuple of float, optional
         Ratio of stiffness to normal stress in each window, divided by the ratio in the first
         window. By default, all factors are 1.
     """
@@ -228,7 +228,7 @@ class JointModel:
 
         Parameters
         ----------
-        parameter_name : str
+        step_time_name : str
             Name of the step time, with or without a window number.
 
         Returns
@@ -245,7 +245,7 @@ class JointModel:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
 
         Raises
@@ -269,11 +269,12 @@ class JointModel:
     ) -> np.ndarray:
         """Compute the friction of the model at each row of all windows.
 
-        The friction does not include the trend. See ``WindowModel.model_friction`` for details.
+        The friction does not include the trend. See ``WindowModel.compute_model_friction`` for
+        details.
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
         with_refined_tolerances : bool, default: False
             If True, all tolerances are reduced by a factor of ten.
@@ -302,7 +303,7 @@ class JointModel:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
 
         Returns
@@ -325,11 +326,11 @@ class JointModel:
     ) -> np.ndarray:
         """Compute the derivatives of friction with respect to parameters.
 
-        See ``WindowModel.jacobian`` for details.
+        See ``WindowModel.compute_jacobian`` for details.
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
         free_parameters : sequence of str
             Names of the free parameters, with window numbers.
@@ -359,7 +360,7 @@ class JointModel:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
 
         Returns

@@ -86,8 +86,8 @@ def integrate_load_point_velocity(
     ----------
     loading : ndarray, shape (segments, 4)
         Segments of constant velocity (see
-        ``rsfstudy.fitting.recorded_loading.loading_history``). The velocity of the first segment is
-        also used before the first segment.
+        ``rsfstudy.fitting.recorded_loading.build_loading_history``). The velocity of the first
+        segment is also used before the first segment.
     time : ndarray, shape (rows,)
         Times in s.
     zero_displacement_time : float
@@ -163,7 +163,7 @@ def _compute_covariance_root_from_noise(
     ----------
     time : ndarray, shape (rows,)
         Times in s.
-    displacement_columns : ndarray, shape (rows, parameters + 1)
+    jacobian_and_residual_columns : ndarray, shape (rows, parameters + 1)
         Derivatives of displacement with respect to the parameters, followed by the residuals. The
         last parameter is the initial displacement.
 

@@ -4,9 +4,9 @@ The maximum of noisy samples overestimates the height of a peak. The last sample
 change is only a noisy estimate of the value before the change. The functions of this module
 therefore fit a polynomial to the samples in a window. A window that is too long biases the
 polynomial, and a window that is too short increases its variance. The function
-``choose_polynomial_window`` selects the longest window in which a polynomial describes the samples
-within their noise. The estimate then uses a polynomial of higher degree in the same window, so that
-the bias of the estimate is small compared with its standard error [1]_.
+``choose_longest_polynomial_window`` selects the longest window in which a polynomial describes the
+samples within their noise. The estimate then uses a polynomial of higher degree in the same window,
+so that the bias of the estimate is small compared with its standard error [1]_.
 
 References
 ----------
@@ -51,9 +51,9 @@ class GeneralisedLeastSquaresFit(NamedTuple):
     ----------
     coefficients : ndarray, shape (parameters,)
         Estimated coefficients.
-    covariance : ndarray, shape (parameters, parameters)
+    coefficient_covariance : ndarray, shape (parameters, parameters)
         Covariance matrix of the coefficients.
-    noise : NoiseModel
+    noise_model : NoiseModel
         Noise model of the residuals.
     noise_sd : float
         Standard deviation of the noise at the first noise level.
@@ -81,7 +81,7 @@ def fit_linear_model(
         Values to fit.
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the model with respect to the coefficients.
-    quick : bool, default: False
+    noise_by_moments : bool, default: False
         If True, the noise is estimated by the method of moments.
 
     Returns
@@ -159,7 +159,7 @@ def choose_longest_polynomial_window(
         Coordinates and values of the samples.
     degree : int
         Degree of the polynomial.
-    reference : LinearFit
+    noise_reference_fit : LinearFit
         Fit of other rows of the record, which have the same noise.
 
     Returns

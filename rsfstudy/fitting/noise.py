@@ -1,9 +1,9 @@
 r"""White and autoregressive models of the noise of a record.
 
-The function ``fit_noise`` estimates a ``NoiseModel`` from the residuals of a fit by restricted
-maximum likelihood (REML) [1]_. REML accounts for the noise variance that the fitted parameters
-absorb. Let :math:`J` be the Jacobian of the model, :math:`R` the correlation matrix of the noise,
-:math:`p` the number of parameters, and :math:`n` the number of rows. REML minimises
+The function ``fit_noise_model`` estimates a ``NoiseModel`` from the residuals of a fit by
+restricted maximum likelihood (REML) [1]_. REML accounts for the noise variance that the fitted
+parameters absorb. Let :math:`J` be the Jacobian of the model, :math:`R` the correlation matrix of
+the noise, :math:`p` the number of parameters, and :math:`n` the number of rows. REML minimises
 
 .. math:: (n - p) \ln\frac{S}{n - p} + \ln|R| + \ln|J^T R^{-1} J|,
 
@@ -79,7 +79,7 @@ def check_noise_model_name(noise_model_name: str) -> None:
 
     Parameters
     ----------
-    noise_name : str
+    noise_model_name : str
         Name of the noise model, such as "white", "ar" or "ar2".
 
     Raises
@@ -112,11 +112,11 @@ class NoiseModel:
         Runs of consecutive rows with the same noise process and noise level.
     partial_autocorrelations : ndarray, shape (processes, order)
         Partial autocorrelations of each autoregressive process.
-    noise_level_standard_deviations : ndarray, shape (levels,)
+    relative_noise_levels : ndarray, shape (levels,)
         Noise levels relative to the first noise level.
     non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers. By default, no rows are outliers.
-    averaging_correlation : AveragedNoiseCorrelation, optional
+    correlation_from_averaging : AveragedNoiseCorrelation, optional
         Correlation due to averaging by a data logger. This correlation is removed before the
         autoregressive correlation.
     """
@@ -140,7 +140,7 @@ class NoiseModel:
 
         Parameters
         ----------
-        columns : ndarray, shape (rows, columns)
+        sample_columns : ndarray, shape (rows, columns)
             Array to whiten, including the rows of outliers.
 
         Returns
@@ -174,7 +174,7 @@ class NoiseModel:
 
         Parameters
         ----------
-        columns : ndarray, shape (rows, ...)
+        sample_columns : ndarray, shape (rows, ...)
             Array with one entry per row.
 
         Returns
@@ -192,7 +192,7 @@ class NoiseModel:
     def prediction_coefficients_and_variances(self) -> list[tuple[list[list[float]], list[float]]]:
         """Prediction coefficients and error variances of each noise process.
 
-        The property contains one result of ``_levinson_durbin`` per noise process.
+        The property contains one result of ``_run_levinson_durbin_recursion`` per noise process.
         """
         return [*map(_run_levinson_durbin_recursion, self.partial_autocorrelations)]
 
@@ -302,7 +302,7 @@ def fit_noise_model(
 
     Parameters
     ----------
-    noise_name : str
+    noise_model_name : str
         Noise model: "white" for white noise, "ar" for the autoregressive order that minimises the
         AIC, or "ar1", "ar2" and so on for a fixed order.
     time : ndarray, shape (rows,)
@@ -385,8 +385,8 @@ def estimate_noise_model_by_moments(
 
     Parameters
     ----------
-    noise_name : str
-        Noise model (see ``fit_noise``).
+    noise_model_name : str
+        Noise model (see ``fit_noise_model``).
     time : ndarray, shape (rows,)
         Times in s.
     residuals : ndarray, shape (rows,)
@@ -554,7 +554,7 @@ class _LaggedProductSums:
 
         Parameters
         ----------
-        noise : NoiseModel
+        noise_model : NoiseModel
             Noise model with the same sampling runs and the same autoregressive order.
 
         Returns

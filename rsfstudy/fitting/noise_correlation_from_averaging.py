@@ -91,7 +91,7 @@ def apply_running_mean(
         Array whose columns are averaged.
     averaging_time : float
         Averaging time in s.
-    centre : float, default: 0.0
+    window_centre_offset : float, default: 0.0
         Time in s from each row to the centre of its averaging interval.
 
     Returns

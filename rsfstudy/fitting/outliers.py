@@ -27,7 +27,7 @@ def find_rounding_quantum(samples: np.ndarray) -> float:
 
     Parameters
     ----------
-    values : ndarray
+    samples : ndarray
         Values such as friction or displacement.
 
     Returns

@@ -78,9 +78,9 @@ def sample_posterior_fit_coordinates(
 
     Parameters
     ----------
-    problem : FitProblem
+    fit_problem : FitProblem
         Least-squares problem that contains the model of the record.
-    solution : FitSolution
+    fit_solution : FitSolution
         Solution of the least-squares problem, with a finite covariance matrix.
     draw_count : int
         Number of draws.
@@ -164,9 +164,9 @@ def sample_posterior_parameters(
 
     Parameters
     ----------
-    problem : FitProblem
+    fit_problem : FitProblem
         Least-squares problem that contains the model of the record.
-    solution : FitSolution
+    fit_solution : FitSolution
         Solution of the least-squares problem.
     draw_count : int
         Number of draws.

@@ -1,6 +1,6 @@
 """Loading histories of records.
 
-The function ``loading_history`` converts the steps of a record, or the recorded rows, to the
+The function ``build_loading_history`` converts the steps of a record, or the recorded rows, to the
 loading of a model.
 """
 
@@ -98,7 +98,7 @@ def build_stepwise_loading_history(start_time: float, steps: Sequence[LoadingSte
     Returns
     -------
     ndarray, shape (segments, 4)
-        Segments in the same format as the result of ``loading_history``.
+        Segments in the same format as the result of ``build_loading_history``.
     """
     pieces, level = [(start_time, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
@@ -157,7 +157,7 @@ def _build_loading_history_from_rows(
     Returns
     -------
     ndarray, shape (rows, 4)
-        Segments in the same format as the result of ``loading_history``.
+        Segments in the same format as the result of ``build_loading_history``.
     """
     lasts = np.diff(record.time)
     moved = isotonic_regression(record.columns["displacement"]).x

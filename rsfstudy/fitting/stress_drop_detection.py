@@ -1,10 +1,10 @@
 """Detection of shear stress drops in a noisy record.
 
-The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
-stress in a window after the sample. The windows have lengths of 4, 8, 16, ... sampling intervals.
-The scaled difference is the difference between the two mean stresses, divided by the standard
-deviation of the differences during loading. Each peak of the scaled difference that exceeds a
-threshold is reported as a stress drop (see ``scipy.signal.find_peaks``).
+The function ``detect_stress_drops`` compares the mean stress in a window before each sample with
+the mean stress in a window after the sample. The windows have lengths of 4, 8, 16, ... sampling
+intervals. The scaled difference is the difference between the two mean stresses, divided by the
+standard deviation of the differences during loading. Each peak of the scaled difference that
+exceeds a threshold is reported as a stress drop (see ``scipy.signal.find_peaks``).
 
 The standard deviation of the differences between mean stresses is estimated from the most frequent
 differences [1]_, which occur during loading. The estimate is valid if stress drops occupy at most a
@@ -64,11 +64,11 @@ class StressDropCandidate(NamedTuple):
     start_time, end_time : float
         Times at which the stress decrease begins and ends. Both times have a resolution of one
         averaging window.
-    window_duration : float
+    averaging_window_duration : float
         Duration of the averaging window, in the unit of ``start_time``.
-    mean_difference_stderr : float
+    window_mean_difference_stderr : float
         Standard error of the difference between the mean stresses of two averaging windows.
-    noise_correlation_factor : float
+    stderr_factor_of_correlated_noise : float
         Factor by which the correlation of the noise increases the standard error of a mean.
     """
 
@@ -118,7 +118,7 @@ def estimate_robust_sd(samples: np.ndarray) -> float:
 
     Parameters
     ----------
-    values : ndarray
+    samples : ndarray
         Samples of approximately Gaussian noise.
 
     Returns
@@ -134,7 +134,7 @@ def find_smallest_nonzero_difference(samples: np.ndarray) -> float:
 
     Parameters
     ----------
-    values : ndarray, shape (samples,)
+    samples : ndarray, shape (samples,)
         Samples.
 
     Returns
@@ -162,7 +162,7 @@ def fit_gaussian_to_most_frequent_values(values: np.ndarray) -> tuple[float, flo
     -------
     mean : float
         Mean of the Gaussian distribution.
-    standard_deviation : float
+    compute_standard_deviation : float
         Standard deviation of the Gaussian distribution.
     """
     ordered = np.sort(values)
@@ -180,9 +180,9 @@ def compute_window_mean_decreases(samples: np.ndarray, window_sample_count: int)
 
     Parameters
     ----------
-    values : ndarray, shape (samples,)
+    samples : ndarray, shape (samples,)
         Samples.
-    window_samples : int
+    window_sample_count : int
         Length of each window in samples.
 
     Returns

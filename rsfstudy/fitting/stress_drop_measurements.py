@@ -43,7 +43,7 @@ class DropSampleIndices(NamedTuple):
         Index of the first sample in the drop.
     end_index : int
         Index of the first sample after the drop.
-    window_sample_count : int
+    averaging_sample_count : int
         Number of samples to average before and after the drop.
     """
 
@@ -176,9 +176,9 @@ def find_sample_indices_of_drop(
     ----------
     times : ndarray, shape (samples,)
         Times of the samples.
-    fitted_candidate : FittedDropCandidate
+    detected_and_fitted_drop : FittedDropCandidate
         Fitted drop.
-    neighbour_limits : (float, float)
+    adjacent_drop_times : (float, float)
         End of the previous drop, and start of the next drop.
 
     Returns
@@ -212,11 +212,11 @@ def compute_drop_quantities(
         Times and shear stresses of the samples.
     displacement : ndarray, shape (samples,), or None
         Displacements of the samples. If the value is None, slip and slip rate are not computed.
-    fitted_candidate : FittedDropCandidate
+    detected_and_fitted_drop : FittedDropCandidate
         Fitted drop.
     sample_indices : DropSampleIndices
         Indices of the samples in the drop.
-    neighbour_limits : (float, float)
+    adjacent_drop_times : (float, float)
         End of the previous drop, and start of the next drop.
 
     Returns

@@ -1,7 +1,7 @@
 """Detection and fitting of shear stress drops in a record.
 
 The module ``drop_detection`` detects the drops, and the module ``drop_fit`` fits straight lines to
-each drop. The function ``find_drops`` calls both modules.
+each drop. The function ``find_stress_drops`` calls both modules.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ class DetectedAndFittedStressDrop(NamedTuple):
 
     Parameters
     ----------
-    drop : FittedStressDrop
+    fitted_drop : FittedStressDrop
         Result of the fit.
-    candidate : DropCandidate
+    detected_drop : DropCandidate
         Detected drop.
     """
 

@@ -54,7 +54,7 @@ class NormalStressStep(NamedTuple):
     ----------
     start_time, end_time : float
         Times in s at which the change begins and ends.
-    stress_before, stress_after : float
+    normal_stress_before, normal_stress_after : float
         Normal stresses in Pa before and after the change.
     """
 

@@ -1,10 +1,10 @@
 """Sizes and times of stress drops, with confidence intervals.
 
-The function ``fit_drop`` models the stress before, during and after a drop by three connected
-straight lines. The lines meet at the times at which the drop begins and ends. For each pair of
-start time and end time, the lines are fitted by least squares. The fit with the smallest sum of
-squares determines the start and the end of the drop. The size of the drop is the difference between
-the highest and the lowest stress.
+The function ``fit_stress_drop`` models the stress before, during and after a drop by three
+connected straight lines. The lines meet at the times at which the drop begins and ends. For each
+pair of start time and end time, the lines are fitted by least squares. The fit with the smallest
+sum of squares determines the start and the end of the drop. The size of the drop is the difference
+between the highest and the lowest stress.
 
 The confidence intervals of the start time and the end time are computed from the sums of squares.
 The intervals contain all pairs of times whose sum of squares exceeds the minimum by less than a
@@ -72,11 +72,11 @@ class FittedStressDrop(NamedTuple):
         the end.
     stress_before, stress_after : float
         Highest stress at the start of the drop, and lowest stress at the end of the drop.
-    start_error, end_error : float
+    start_time_error, end_time_error : float
         Errors of ``start_time`` and ``end_time``.
     stress_before_error, stress_after_error : float
         Errors of ``stress_before`` and ``stress_after``.
-    drop_error : float
+    stress_drop_error : float
         Error of the stress drop ``stress_before - stress_after``.
     residual_sd : float
         Standard deviation of the residuals.
@@ -106,8 +106,8 @@ class _ThreeLineFits(NamedTuple):
     ----------
     corner_time_pairs : ndarray, shape (pairs, 2)
         Pairs of times at which the lines meet.
-    coefficients : ndarray, shape (pairs, 4)
-        Coefficients of the lines (see ``_fit_three_lines``).
+    line_coefficients : ndarray, shape (pairs, 4)
+        Coefficients of the lines (see ``_fit_three_connected_lines``).
     inverse_normal_matrix : ndarray, shape (pairs, 4, 4)
         Inverse of the normal matrix.
     residual_sums_of_squares : ndarray, shape (pairs,)
@@ -148,7 +148,7 @@ def fit_stress_drop(
         Times and shear stresses of the samples, in any units.
     candidate : DropCandidate
         Detected drop.
-    neighbour_limits : (float, float)
+    adjacent_drop_times : (float, float)
         End of the previous drop, and start of the next drop.
     noise_sd : float
         Standard deviation of the noise.

@@ -43,7 +43,7 @@ class SamplingRun(NamedTuple):
         Index of the first row, and index of the row after the last row.
     noise_process_index : int
         Index of the noise process.
-    row_count_since_clock_start : int
+    row_count_since_time_restart : int
         Number of rows between the last restart of the clock and the start of the run.
     noise_level_index : int
         Index of the noise level.
@@ -173,7 +173,7 @@ def find_noise_level_changes(
     ----------
     whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
-    min_absolute_value : float, default: 0.0
+    min_absolute_difference : float, default: 0.0
         Lower bound on the absolute differences between successive residuals.
 
     Returns
@@ -223,7 +223,7 @@ def _refine_row_of_noise_level_change(
     ----------
     squared_residuals : ndarray, shape (rows,)
         Squares of the whitened residuals.
-    first_row, initial_row, last_row : int
+    first_row, initial_row, stop_row : int
         First row of the segment before the change, estimated row of the change, and end (exclusive)
         of the segment after the change.
 

@@ -375,9 +375,9 @@ def split_rows_into_segments(
 
     Parameters
     ----------
-    residual_squares : callable
+    residual_squares_function : callable
         Function that returns the sum of squared residuals of the rows i to j.
-    first_row, last_row : int
+    first_row, stop_row : int
         First row of the range to split, and row after the last row of the range.
     variance_of_noise : float
         Variance of the noise.
@@ -385,7 +385,7 @@ def split_rows_into_segments(
     Returns
     -------
     set of int
-        First row of each segment, and the row ``last_row`` after the last segment.
+        First row of each segment, and the row ``stop_row`` after the last segment.
     """
     open_parts, found = [(first_row, stop_row)], {first_row, stop_row}
     while open_parts:

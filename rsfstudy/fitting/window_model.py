@@ -85,7 +85,7 @@ LOADING_STEP_SHIFT_OVER_STANDARD_ERROR = 0.01
 #: Domains of bounded parameters. Near the ends of a domain, one-sided finite differences are used.
 _PARAMETER_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Scales of some parameters. The step size of a finite difference is proportional to the scale of
-#: the parameter. The method ``WindowModel._typical_parameter_size`` computes the scales of all
+#: the parameter. The method ``WindowModel._find_typical_parameter_size`` computes the scales of all
 #: other parameters.
 _TYPICAL_PARAMETER_SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
 #: The largest number of right-hand-side evaluations of a simulation is the sum of three terms: a
@@ -193,17 +193,17 @@ class WindowModel:
     ----------
     scene : Scene
         Scene with the friction law and the fixed parameters.
-    time, displacement, friction : ndarray, shape (rows,)
+    time, load_point_displacement, recorded_friction : ndarray, shape (rows,)
         Times of the rows in s, load point displacements since the first step in um, and recorded
         friction.
     loading_segments : ndarray, shape (segments, 4)
-        Loading history (see ``rsfstudy.fitting.recorded_loading.loading_history``).
+        Loading history (see ``rsfstudy.fitting.recorded_loading.build_loading_history``).
     integrator : Integrator
         Integrator with the requested accuracy.
     loadings_with_shifted_steps : sequence of ndarray, optional
         Loading histories with shifted step times and velocities (see
-        ``rsfstudy.fitting.load_point_noise.shift_steps_by_their_errors``).
-    filter : Filter, optional
+        ``rsfstudy.fitting.load_point_noise.copy_steps_shifted_by_their_errors``).
+    friction_filter : Filter, optional
         Filter that was applied to friction before it was recorded.
     """
 
@@ -256,7 +256,7 @@ class WindowModel:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters, in the units of ``PARAMETERS``.
 
         Returns
@@ -300,7 +300,7 @@ class WindowModel:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters, in the units of ``PARAMETERS``.
         with_refined_tolerances : bool, default: False
             If True, all tolerances are reduced by a factor of ten.
@@ -372,7 +372,7 @@ class WindowModel:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters. The coefficient ``trend<n>`` has the unit um^-n.
 
         Returns
@@ -393,7 +393,7 @@ class WindowModel:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
 
         Returns
@@ -426,7 +426,7 @@ class WindowModel:
 
         Parameters
         ----------
-        values : mapping of str to float
+        parameter_values : mapping of str to float
             Values of all parameters.
         free_parameters : sequence of str
             Names of the free parameters.
@@ -602,15 +602,15 @@ def fit_parameters_to_scene_fields(
 
     Parameters
     ----------
-    values : mapping of str to float
+    parameter_values : mapping of str to float
         Values of the parameters, in the units of ``PARAMETERS``.
-    velocity : float
+    velocity_unit : float
         Load point velocity in um/s, which is the unit of velocity in the scene.
 
     Returns
     -------
     dict of {str: float}
-        Scene fields, with the slip distance and ``velocity`` as units.
+        Scene fields, with the slip distance and ``velocity_unit`` as units.
 
     Examples
     --------
@@ -646,11 +646,11 @@ def shift_parameter(
 
     Parameters
     ----------
-    values : mapping of str to float
+    parameter_values : mapping of str to float
         Values of all parameters.
     parameter_name : str
         Name of the parameter to shift.
-    coordinate_change : float
+    fit_coordinate_change : float
         Change in the parameter, or in its logarithm for parameters in ``LOGARITHMIC_PARAMETERS``.
 
     Returns
@@ -694,7 +694,7 @@ def fit_coordinate_to_parameter(parameter_name: str, fit_coordinate: float) -> f
     ----------
     parameter_name : str
         Name of the parameter.
-    coordinate : float
+    fit_coordinate : float
         Logarithm of the parameter for parameters in ``LOGARITHMIC_PARAMETERS``, and the value
         itself for all other parameters.
 

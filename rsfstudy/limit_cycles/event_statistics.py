@@ -9,7 +9,7 @@ With white noise, :math:`\ln V` fluctuates as rapidly as the noise, so the slip 
 level many times. Event detection in scenes with noise therefore uses two levels. An event begins
 when the slip rate first exceeds a multiple of the load point velocity, and it ends when the slip
 rate falls below the load point velocity. In scenes without noise, the events are the cycles of
-``iterate_cycles``.
+``iterate_stick_slip_cycles``.
 """
 
 from __future__ import annotations
@@ -243,7 +243,7 @@ class EventStatistics(Measure):
     ) -> list[_Event]:
         """Return the events that delimit the intervals, without the discarded events.
 
-        The list is shorter than ``cycles + 1`` if the motion settles.
+        The list is shorter than ``cycle_count + 1`` if the motion settles.
         """
         events = (
             self._iterate_events_of_noisy_motion(scene, integrator)

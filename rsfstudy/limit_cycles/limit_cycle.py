@@ -326,7 +326,8 @@ def _build_several_events_period_message(orbit: PeriodicOrbit) -> str:
         return ""
     period = math.fsum(cycle.recurrence_interval for cycle in orbit.cycles)
     return (
-        f"the motion repeats itself after {orbit.period_in_cycles} events, with a period of {period:.6g} "
+        f"the motion repeats itself after {orbit.period_in_cycles} events, with a "
+        f"period of {period:.6g} "
         "D_c/V_*. The results describe the event with the highest peak slip rate, until the next "
         "maximum of the spring stress"
     )
@@ -379,7 +380,7 @@ def build_outcome_of_aperiodic_motion(
     ----------
     scene : Scene
         Scene of the motion.
-    sequence : StickSlipSequence
+    stick_slip_sequence : StickSlipSequence
         Events of the motion.
     remedy : str
         Advice for the message if the motion may still reach a periodic orbit.
@@ -393,7 +394,8 @@ def build_outcome_of_aperiodic_motion(
     peaks = [cycle.max_log_slip_rate / LN10 for cycle in latest]
     intervals = [cycle.recurrence_interval for cycle in latest]
     text = (
-        f"the last {len(latest)} of {len(stick_slip_sequence.cycles)} events have peak slip rates of "
+        f"the last {len(latest)} of {len(stick_slip_sequence.cycles)} events have peak "
+        "slip rates of "
         f"10^{min(peaks):.4g} to 10^{max(peaks):.4g} V_* and intervals of {min(intervals):.5g} to "
         f"{max(intervals):.5g} D_c/V_*"
     )

@@ -5,9 +5,9 @@ determines the subsequent motion. Two successive cycles are therefore sufficient
 derivative of the return map. If the cycles converge slowly, the search continues from an
 extrapolated fixed point of the return map.
 
-If a scene has several states, use ``follow_to_periodic_orbit``. The function
-``follow_to_periodic_orbit`` integrates the motion cycle by cycle, and compares the cycles to find
-the number of cycles after which the motion repeats.
+If a scene has several states, use ``follow_motion_to_periodic_orbit``. The function
+``follow_motion_to_periodic_orbit`` integrates the motion cycle by cycle, and compares the cycles to
+find the number of cycles after which the motion repeats.
 
 Notes
 -----
@@ -93,8 +93,8 @@ class LimitCycleSearch:
     Attributes
     ----------
     cycles : list of Cycle
-        All computed cycles. If ``follow_until_converged`` has returned True, the last cycle is the
-        limit cycle.
+        All computed cycles. If ``follow_cycles_until_converged`` has returned True, the last cycle
+        is the limit cycle.
     """
 
     def __init__(self, scene: Scene, integrator: Integrator) -> None:
@@ -315,7 +315,7 @@ class StickSlipSequence:
     ----------
     cycles : list of Cycle
         Cycles of the motion. In the results of ``LimitCycle``, a cycle is called an event.
-    orbit : PeriodicOrbit or None
+    approached_periodic_orbit : PeriodicOrbit or None
         Periodic orbit that the motion approaches, or None if no orbit was found.
     may_still_converge : bool
         True if the motion may still approach a periodic orbit.

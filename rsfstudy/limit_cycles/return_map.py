@@ -1,7 +1,7 @@
 r"""Periodic orbits, computed as fixed points of a return map.
 
 The main methods are ``ReturnMap.find_periodic_orbit``, which searches for an orbit, and
-``ReturnMap.refine_orbit``, which computes a known orbit with another accuracy.
+``ReturnMap.refine_periodic_orbit``, which computes a known orbit with another accuracy.
 
 A cycle extends from one rise of V through V_0 to the next rise. At a rise, the slip rate is known,
 so the motion is determined by spring stress and the states. If the slider has inertia, the spring
@@ -74,16 +74,16 @@ class PeriodicOrbit:
     ----------
     cycles : tuple of Cycle
         Successive cycles.
-    cycle_derivatives : tuple of ndarray
+    return_map_derivatives_per_cycle : tuple of ndarray
         Derivatives of each cycle, of shape (1 + states + results, 1 + states). Rows correspond to
         the spring stress and the states at the end of the cycle, and to the main results. Columns
         correspond to the spring stress and the states at the beginning of the cycle.
     start_section_correction : ndarray, shape (1 + states,)
         Vector from the section at which the computed cycles begin to the corresponding section of
         the closed orbit.
-    accuracy : Accuracy
+    integration_accuracy : Accuracy
         Accuracy with which the cycles were computed.
-    evaluation_count : int
+    rhs_evaluation_count : int
         Number of right-hand-side evaluations.
     recording : Recording, optional
         Recording along the cycles. The recording may extend beyond the end of the cycles.
@@ -162,7 +162,7 @@ def extract_section_coordinates(motion_point: MotionPoint) -> np.ndarray:
 
     Parameters
     ----------
-    point : MotionPoint
+    motion_point : MotionPoint
         Point of a motion.
 
     Returns
@@ -202,7 +202,7 @@ def multiply_return_map_derivatives(
 
     Parameters
     ----------
-    cycle_derivatives : sequence of ndarray
+    return_map_derivatives_per_cycle : sequence of ndarray
         Derivatives of each cycle.
 
     Returns
@@ -263,7 +263,7 @@ class ReturnMap:
 
         Parameters
         ----------
-        section : ndarray, shape (1 + states,)
+        section_coordinates : ndarray, shape (1 + states,)
             Spring stress and states.
 
         Returns
@@ -529,7 +529,7 @@ class ReturnMap:
     ) -> PeriodicOrbit | None:
         r"""Solve for a periodic orbit with a given number of cycles.
 
-        The length of ``cycle_derivatives`` defines the number of cycles.
+        The length of ``return_map_derivatives_per_cycle`` defines the number of cycles.
 
         Returns
         -------

@@ -2,7 +2,7 @@
 
 A cycle extends from one maximum of spring stress to the next maximum. At a maximum of spring
 stress, the slip rate V rises through the load point velocity V_0. The main function is
-``iterate_cycles``.
+``iterate_stick_slip_cycles``.
 """
 
 from __future__ import annotations
@@ -58,13 +58,13 @@ class StickSlipCycle(NamedTuple):
     ----------
     recurrence_interval : float
         Time from the first to the second maximum of spring stress.
-    max_spring_stress : float
+    max_spring_stress_deviation : float
         Deviation of spring stress from steady sliding at V_*, at the second maximum.
-    min_spring_stress : float
+    min_spring_stress_deviation : float
         Deviation of spring stress at its minimum.
-    spring_stress_at_peak : float
+    spring_stress_deviation_at_peak_rate : float
         Deviation of spring stress at the peak slip rate.
-    friction_at_peak : float
+    friction_coefficient_at_peak_rate : float
         Friction coefficient at the peak slip rate.
     min_log_slip_rate : float
         Smallest value of ln(V/V_*) during the cycle.
@@ -74,7 +74,7 @@ class StickSlipCycle(NamedTuple):
         First point after the rupture at which V is below V_0 and friction balances the spring. If
         friction never balances the spring after the rupture, the attribute contains the point with
         the lowest slip rate.
-    slowest_point : MotionPoint
+    slowest_slip_point : MotionPoint
         Point with the lowest slip rate.
     start_point : MotionPoint
         Maximum of spring stress at which the cycle begins.

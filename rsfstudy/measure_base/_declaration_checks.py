@@ -79,9 +79,9 @@ def check_coordinate_values(dimension_name: str, coordinate_values: Any) -> None
 
     Parameters
     ----------
-    name : str
+    dimension_name : str
         Name of the dimension.
-    values : array_like
+    coordinate_values : array_like
         Coordinate values.
 
     Raises

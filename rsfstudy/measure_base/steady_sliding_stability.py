@@ -35,6 +35,7 @@ def is_steady_sliding_linearly_stable(scene: Scene) -> bool:
             Status.UNVERIFIED,
             "the motion approaches steady sliding, but it is undecided whether it settles, "
             f"because the growth rate of small perturbations is {growth.real_part:.1e} per D_c of "
-            f"slip with an error of {growth.error_estimate:.1e}. Use a slightly different stiffness=.",
+            f"slip with an error of {growth.error_estimate:.1e}. Use a slightly "
+            "different stiffness=.",
         )
     return growth.real_part < 0.0

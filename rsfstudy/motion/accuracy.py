@@ -179,9 +179,9 @@ class Accuracy:
         """Maximum change in ln V due to inertia on the slow manifold.
 
         If friction weakens strongly with slip, a motion exceeds this limit before it exceeds the
-        limit ``max_inertia_weight``. If the maximum change in ln V is :math:`d`, the error of a
-        limit cycle is up to :math:`0.07 d^3` in random scenes, and :math:`0.0014 d^3` for the
-        slider of the published study. The test suite measures both coefficients.
+        limit ``max_inertia_weight_on_slow_manifold``. If the maximum change in ln V is :math:`d`,
+        the error of a limit cycle is up to :math:`0.07 d^3` in random scenes, and :math:`0.0014
+        d^3` for the slider of the published study. The test suite measures both coefficients.
         """
         return math.cbrt(
             15.0 * min(self.rtol, _LARGEST_RTOL_IN_REGIME_THRESHOLDS) * self.refinement

@@ -55,7 +55,7 @@ def find_segments_left_to_integrate(
     ----------
     scene : Scene
         Scene of the motion.
-    resume_from : Event
+    last_event : Event
         Last event of the motion.
 
     Returns
@@ -112,14 +112,14 @@ def prepare_segment_with_noise(
     ----------
     scene : Scene
         Scene with noise during the loading segment.
-    start : MotionPoint
+    start_point : MotionPoint
         First point of the loading segment.
     segment_table : ndarray
         Table with a single row, which describes the loading segment without noise.
 
     Returns
     -------
-    start : MotionPoint
+    start_point : MotionPoint
         First point. Its normal stress includes the noise.
     parameters : tuple of float
         Parameters that apply during the first row of ``table``.
@@ -188,17 +188,18 @@ def select_possible_event_specs(
 
     The motion can settle only in the last chain. Settling events are omitted if the load point
     oscillates. If steady sliding is unstable, terminal settling events are also omitted, because
-    these events would end the motion. See ``drop_settling_if_unstable`` for other settling events.
+    these events would end the motion. See ``drop_settling_events_if_unstable`` for other settling
+    events.
 
     Parameters
     ----------
     scene : Scene
         Scene of the motion.
-    chain_scene : Scene
+    first_segment_scene : Scene
         Scene of the first segment of the chain.
     event_specs : sequence of EventSpecification
         Requested events.
-    is_last_chain : bool
+    includes_last_segment : bool
         True if no other chain follows.
 
     Returns
@@ -228,7 +229,7 @@ def drop_settling_events_if_unstable(
     ----------
     scene : Scene
         Scene of the motion.
-    motion : iterator of Event
+    motion_events : iterator of Event
         Events of the motion.
 
     Yields

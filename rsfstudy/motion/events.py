@@ -25,8 +25,8 @@ In addition to the requested events, the table lists the start of the motion, ea
 the beginning of each loading segment, the end of the motion, and the end of the step in which the
 last requested sample was recorded. If an event occurs at the transition between two regimes or
 segments, it is reported at the beginning of the later regime or segment. If the scene has inertia,
-a rupture begins and ends with a change of regime (``EventKind.REGIME``), unless a loading segment
-begins or ends at the same time. If a motion cannot continue, the integration raises
+a rupture begins and ends with a change of regime (``EventKind.REGIME_CHANGE``), unless a loading
+segment begins or ends at the same time. If a motion cannot continue, the integration raises
 ``MotionStopped`` with the reason.
 """
 
@@ -80,7 +80,7 @@ class EventSpecification(NamedTuple):
         ``approach_to_steady_state``.
     terminal : bool, default: False
         If True, the motion ends at the event.
-    may_defer : bool, default: False
+    may_report_later : bool, default: False
         If True, the engine may delay the reports of the event and of the start of the motion, and
         report several events together. This makes the integration faster.
     """
@@ -104,7 +104,7 @@ def maximum(
         Quantity whose maxima are located.
     terminal : bool, default: False
         If True, the motion ends at the first maximum.
-    may_defer : bool, default: False
+    may_report_later : bool, default: False
         If True, the engine may delay the report of the event and report several events together.
         See ``EventSpecification``.
 
@@ -130,7 +130,7 @@ def minimum(
         Quantity whose minima are located.
     terminal : bool, default: False
         If True, the motion ends at the first minimum.
-    may_defer : bool, default: False
+    may_report_later : bool, default: False
         If True, the engine may delay the report of the event and report several events together.
         See ``EventSpecification``.
 
@@ -158,7 +158,7 @@ def rise(
         Level of the crossing.
     terminal : bool, default: False
         If True, the motion ends at the first crossing.
-    may_defer : bool, default: False
+    may_report_later : bool, default: False
         If True, the engine may delay the report of the event and report several events together.
         See ``EventSpecification``.
 
@@ -186,7 +186,7 @@ def fall(
         Level of the crossing.
     terminal : bool, default: False
         If True, the motion ends at the first crossing.
-    may_defer : bool, default: False
+    may_report_later : bool, default: False
         If True, the engine may delay the report of the event and report several events together.
         See ``EventSpecification``.
 
@@ -255,7 +255,7 @@ class Event(NamedTuple):
         Name of the regime.
     evaluation_count : int
         Number of right-hand side evaluations so far.
-    clock : float
+    independent_variable : float
         Independent variable of the equations, measured from the start of the regime. The
         independent variable is the path length, or the slip of a rigid slider.
     """

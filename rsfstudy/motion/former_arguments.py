@@ -98,7 +98,10 @@ def replace_former_arguments_by_integrator(
         raise InvalidValue(
             "accuracy, meter", (accuracy, meter), rule, remedy=_REMEDY_FOR_FORMER_ARGUMENTS
         )
-    text = f"An integrator has replaced the arguments accuracy and meter. {_REMEDY_FOR_FORMER_ARGUMENTS}"
+    text = (
+        "An integrator has replaced the arguments accuracy and meter. "
+        f"{_REMEDY_FOR_FORMER_ARGUMENTS}"
+    )
     warnings.warn(text, DeprecationWarning, stacklevel=find_stacklevel_of_user_code())
     rest = tuple(a for a in arguments if not isinstance(a, Accuracy | WorkMeter))
     others = {name: value for name, value in keywords.items() if name not in _FORMER_ARGUMENT_NAMES}

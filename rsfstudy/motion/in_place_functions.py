@@ -1,10 +1,10 @@
 """Conversion of equations of motion to functions that fill arrays.
 
 The event loop calls the equations through functions that fill arrays. The functions of
-``slider.equations.Equations`` take and return tuples of floats. ``build_in_place_functions``
-converts these functions to functions that fill arrays. Compiled functions cannot raise exceptions.
-Each function therefore first fills its results with NaN. The values remain NaN if the equations
-raise an exception in compiled code.
+``slider.equations.EquationsOfMotion`` take and return tuples of floats.
+``build_in_place_functions`` converts these functions to functions that fill arrays. Compiled
+functions cannot raise exceptions. Each function therefore first fills its results with NaN. The
+values remain NaN if the equations raise an exception in compiled code.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class InPlaceFunctions(NamedTuple):
         Function that fills an array with the values of a point of the motion.
     attempt_step : callable
         Function that attempts one step. See ``steppers.unrolled_step``.
-    fill_balance : callable or None
+    fill_force_balance : callable or None
         Function that fills in ln(V/V_*) and friction on the slow manifold. The value is None for
         the inertial equations of motion in ruptures.
     """

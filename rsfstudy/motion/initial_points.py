@@ -37,8 +37,8 @@ def compute_initial_point(scene: Scene) -> MotionPoint:
     Returns
     -------
     MotionPoint
-        Initial point. Only the fields set by ``point_without_derived_values`` contain values. All
-        other fields are NaN.
+        Initial point. Only the fields set by ``build_point_without_derived_values`` contain values.
+        All other fields are NaN.
 
     Raises
     ------
@@ -126,8 +126,8 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: FloatTuple
     Returns
     -------
     MotionPoint
-        Initial point. Only the fields set by ``point_without_derived_values`` contain values. All
-        other fields are NaN.
+        Initial point. Only the fields set by ``build_point_without_derived_values`` contain values.
+        All other fields are NaN.
 
     Raises
     ------

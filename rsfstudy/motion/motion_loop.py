@@ -120,7 +120,7 @@ def advance_motion(
 
     Parameters
     ----------
-    motion_memory : array of MOTION_STATE_DTYPE, shape (1,)
+    motion_state_array : array of MOTION_STATE_DTYPE, shape (1,)
         State of the motion. The loop updates it in place.
     y : array of shape (2 * unknowns,)
         Unknowns, followed by their derivatives. The loop updates both in place.
@@ -128,7 +128,7 @@ def advance_motion(
         Last point of the motion in the previous regime. In the first call, pass the initial point
         of the motion.
     workspace_block : array
-        Memory for the workspace of a regime. See ``workspace.workspace_size``.
+        Memory for the workspace of a regime. See ``workspace.compute_workspace_size``.
     loop_constants : tuple
         Five items: the scales of the unknowns of both regimes, the function table with one row per
         regime, the switch thresholds, the parameters of the scene, and memory for the parameters

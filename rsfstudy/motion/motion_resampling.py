@@ -35,7 +35,7 @@ def resample_motion_along_path(
 
     Parameters
     ----------
-    motion_table : ndarray
+    recorded_rows : ndarray
         Rows of a recorded motion.
     point_count : int
         Number of points.

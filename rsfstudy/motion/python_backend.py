@@ -50,8 +50,8 @@ class PythonBackend:
         Parameters
         ----------
         initial_state : dict of str to float
-            Initial values of the fields, from ``initial_state_values``.
-        call_arguments : tuple of float
+            Initial values of the fields, from ``pack_initial_motion_state``.
+        values_set_by_caller : tuple of float
             Values of the fields in ``array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER``.
 
         Returns

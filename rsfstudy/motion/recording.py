@@ -126,7 +126,7 @@ class Recording:
 
         Parameters
         ----------
-        max_time : float
+        end_time : float
             End time of the segment chain. The method assigns this time to the last recorded row.
         """
         if self.sample_times is not None:
@@ -150,8 +150,8 @@ class Recording:
         Returns
         -------
         ndarray
-            Table with one row per sample. The columns are ``RECORDED_VARIABLES``, the regime, the
-            sample number, and the states that all loading segments have in common.
+            Table with one row per sample. The columns are ``RECORDED_VARIABLE_NAMES``, the regime,
+            the sample number, and the states that all loading segments have in common.
         """
         rows = self._row_blocks or [np.empty((0, FIRST_STATE_COLUMN + scene.state_count))]
         columns = min(part.shape[1] for part in rows)
@@ -197,7 +197,7 @@ class Recording:
             Time in D_c/V_* and slip in D_c since the start.
         point : MotionPoint
             Point to convert.
-        regime : int
+        regime_index : int
             Index of the regime.
 
         Returns
@@ -215,7 +215,7 @@ class Recording:
 
         Parameters
         ----------
-        motion_table : ndarray
+        recorded_rows : ndarray
             Rows of a recorded motion.
 
         Returns
@@ -236,7 +236,7 @@ class Recording:
         ----------
         scene : Scene
             Scene of the motion.
-        motion_table : ndarray
+        recorded_rows : ndarray
             Rows of a recorded motion.
 
         Returns
@@ -307,7 +307,7 @@ def truncate_recording_at_row(recorded_rows: np.ndarray, last_row: np.ndarray) -
 
     Parameters
     ----------
-    motion_table : ndarray
+    recorded_rows : ndarray
         Recorded motion. The function may change it in place.
     last_row : ndarray
         Last row of the truncated motion.
@@ -451,7 +451,7 @@ def find_fractional_row_of_extremum(
 
     Parameters
     ----------
-    values : array of shape (rows,)
+    column_values : array of shape (rows,)
         Column of a recorded motion.
     step_sample_numbers : array of shape (rows,)
         Sample numbers within the steps.
@@ -500,7 +500,7 @@ def interpolate_at_fractional_rows(
 
     Within a step, the function evaluates the polynomial through the samples of the step. Between
     two regimes, the function interpolates linearly. In compiled code,
-    ``compiled.array_operations.interpolate_rows`` replaces this function.
+    ``compiled.array_operations.interpolate_at_fractional_rows`` replaces this function.
 
     Parameters
     ----------
@@ -530,7 +530,7 @@ def interpolate_at_fractional_rows(
 
 
 #: Coefficients of the interpolation within a step. The variable of the polynomial is -1 at the
-#: beginning of the step and 1 at its end. ``INTERPOLATION_COEFFICIENTS[power][k]`` is the
+#: beginning of the step and 1 at its end. ``SAMPLE_INTERPOLATION_COEFFICIENTS[power][k]`` is the
 #: contribution of sample ``k`` to the coefficient of ``power``.
 HALF_SAMPLES, _SAMPLE_INDICES = 0.5 * SAMPLES_PER_STEP, np.arange(SAMPLES_PER_STEP + 1)
 _INVERSE_VANDERMONDE_MATRIX = np.linalg.inv(

@@ -4,7 +4,7 @@ If the scene has inertia, a motion alternates between two regimes: the slow mani
 inertial equations of motion. The slow manifold approximates the effect of inertia by a series in
 the inertia weight :math:`(K/a) w^2`, where :math:`w` is the dimensionless slip rate norm. The event
 loop integrates the inertial equations of motion in ruptures. The function
-``starts_on_slow_manifold`` chooses the regime at the beginning of a motion or loading segment. A
+``can_start_on_slow_manifold`` chooses the regime at the beginning of a motion or loading segment. A
 rupture begins if ``compute_inertia_effect_over_limit`` reaches 1, and ends if
 ``should_switch_back_to_slow_manifold`` returns True. Most criteria are functions of floats, so all
 engines can call them.
@@ -47,9 +47,9 @@ class RegimeSwitchThresholds(NamedTuple):
     ----------
     max_slip_rate_norm : float
         Maximum slip rate norm :math:`w` on the slow manifold.
-    max_inertia_correction : float
+    max_log_rate_change_by_inertia : float
         Maximum change in ln V due to inertia on the slow manifold.
-    max_remaining_slip : float
+    max_slip_in_return_to_slow_manifold : float
         Maximum slip during a transition to the slow manifold, in D_c.
     stiffness_over_a : float
         Ratio :math:`K/a`.

@@ -81,7 +81,7 @@ def compute_root_interpolation_step(
     ----------
     previous, best, other : float
         Previous estimate, best estimate, and other end of the bracket.
-    at_previous, at_best, at_other : float
+    value_at_previous, value_at_best, value_at_other : float
         Function values at the three points.
 
     Returns

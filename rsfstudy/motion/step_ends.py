@@ -136,7 +136,7 @@ def repeat_step_to_segment_end_time(motion, workspace, independent_variable):
         State of the motion.
     workspace : Workspace
         Arrays of the regime.
-    clock : float
+    independent_variable : float
         Estimate of the independent variable at the end time, computed from dense output.
     """
     for _ in range(SEGMENT_END_CORRECTION_ITERATIONS):

@@ -73,7 +73,7 @@ def append_event_row(
         Output table of events.
     event_code : float
         Index of an event specification, or a code such as ``START_CODE``.
-    clock : float
+    independent_variable : float
         Independent variable at the event.
     time : float
         Time of the event since the start of the loading segment, in D_c/V_*.

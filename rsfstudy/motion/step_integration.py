@@ -112,7 +112,7 @@ def compute_slip_since_motion_start(motion, independent_variable, time, spring_s
     ----------
     motion : record
         State of the motion.
-    clock : float
+    independent_variable : float
         Independent variable at the point.
     time : float
         Time since the start of the loading segment, in D_c/V_*.
@@ -279,7 +279,7 @@ def evaluate_point_within_step(motion, workspace, independent_variable):
         State of the motion.
     workspace : Workspace
         Arrays of the regime.
-    clock : float
+    independent_variable : float
         Value of the independent variable between the beginning and the end of the step.
     """
     interpolate_unknowns(motion, workspace, independent_variable)
@@ -309,7 +309,7 @@ def truncate_step_at(motion, workspace, independent_variable):
         State of the motion.
     workspace : Workspace
         Arrays of the regime.
-    clock : float
+    independent_variable : float
         Value of the independent variable between the beginning and the end of the step.
     """
     if independent_variable != motion.end:

@@ -105,7 +105,7 @@ def may_any_event_be_reported_later(workspace):
     Returns
     -------
     bool
-        True if at least one event specification has the flag ``SPEC_MAY_DEFER``.
+        True if at least one event specification has the flag ``SPEC_MAY_REPORT_LATER``.
     """
     found = False
     for w in range(workspace.event_spec_count):
@@ -152,10 +152,10 @@ def has_event_occurred(event_spec, quantity_before, quantity_after, integration_
     event_spec : array
         Row of the table of event specifications.
     quantity_before : float
-        Value of ``evaluate_event_quantity`` at the beginning of the interval.
+        Value of ``evaluate_event_function`` at the beginning of the interval.
     quantity_after : float
-        Value of ``evaluate_event_quantity`` at the end of the interval.
-    clock_direction : float
+        Value of ``evaluate_event_function`` at the end of the interval.
+    integration_direction : float
         Direction of the independent variable, 1 or -1.
 
     Returns
@@ -179,7 +179,7 @@ def evaluate_root_condition(independent_variable, condition_context):
 
     Parameters
     ----------
-    clock : float
+    independent_variable : float
         Value of the independent variable between the beginning and the end of the step.
     condition_context : tuple of (float, record, Workspace)
         Condition, state of the motion and arrays of the regime. The condition is the index of an

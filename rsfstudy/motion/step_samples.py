@@ -1,7 +1,8 @@
 """Recording of samples within a step.
 
-``record_step`` is called by ``motion_loop.integrate_one_regime`` after each step of a recorded
-motion. Samples are recorded at even intervals within each step, or at requested times or slips.
+``record_step_samples`` is called by ``motion_loop.integrate_one_regime`` after each step of a
+recorded motion. Samples are recorded at even intervals within each step, or at requested times or
+slips.
 """
 
 from __future__ import annotations
@@ -210,7 +211,7 @@ def record_sample_within_step(motion, workspace, recording_table, independent_va
         Arrays of the regime.
     recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
         Output table of recorded samples.
-    clock : float
+    independent_variable : float
         Value of the independent variable between the beginning and the end of the step.
     """
     evaluate_point_within_step(motion, workspace, independent_variable)
@@ -232,7 +233,7 @@ def append_sample_row(
 ):
     """Append a point of the motion to the recording table.
 
-    The columns of the new row are in the order of ``recording.pack_recorded_row``.
+    The columns of the new row are in the order of ``recording.pack_point_into_recording_row``.
 
     Parameters
     ----------
@@ -240,7 +241,7 @@ def append_sample_row(
         State of the motion.
     recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
         Output table of recorded samples.
-    clock : float
+    independent_variable : float
         Independent variable at the point.
     time : float
         Time since the start of the loading segment, in D_c/V_*.

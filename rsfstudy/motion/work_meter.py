@@ -47,9 +47,9 @@ class WorkMeter:
         Number of right-hand side evaluations in each regime.
     evaluations : int, default: 0
         Number of right-hand side evaluations, including evaluations for numerical Jacobians.
-    steps : int, default: 0
+    step_count : int, default: 0
         Number of integration steps.
-    jacobians : int, default: 0
+    jacobian_evaluations : int, default: 0
         Number of Jacobian evaluations.
     """
 

@@ -168,7 +168,7 @@ def create_workspace(
     Parameters
     ----------
     workspace_block : array
-        Memory of the arrays. See ``workspace_size``.
+        Memory of the arrays. See ``compute_workspace_size``.
     y : array
         Unknowns at the beginning of the step.
     unknown_count : int

@@ -489,7 +489,7 @@ def compute_point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
 def add_colour_bar_of_dimension(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     """Add a colour bar for the points of a numeric dimension.
 
-    The colour bar has the same colour scale as ``point_colours``.
+    The colour bar has the same colour scale as ``compute_point_colours``.
 
     Parameters
     ----------
@@ -510,7 +510,7 @@ def add_colour_bar_of_variable(
 
     Parameters
     ----------
-    scale : matplotlib.cm.ScalarMappable
+    colour_scale : matplotlib.cm.ScalarMappable
         Colour scale.
     dataset : xarray.Dataset
         Dataset with the variable.

@@ -1,8 +1,8 @@
 """Drawing of the panels of a figure.
 
-The function ``expand_facets`` creates one panel per facet, and ``draw_panel`` draws the curves,
-labels and title of a panel. After all panels are drawn, ``finalize_scales_and_legends`` applies
-common scales and adds legends.
+The function ``split_panel_by_facets`` creates one panel per facet, and ``draw_panel`` draws the
+curves, labels and title of a panel. After all panels are drawn, ``finalize_scales_and_legends``
+applies common scales and adds legends.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Width and height of figures.
 
-The context manager ``width_context`` sets the width of all figures that the package creates inside
-a ``with`` block. If no width is set, figures with several columns of panels are as wide as a
+The context manager ``figure_width_context`` sets the width of all figures that the package creates
+inside a ``with`` block. If no width is set, figures with several columns of panels are as wide as a
 journal page, and other figures are as wide as one column of the page.
 """
 

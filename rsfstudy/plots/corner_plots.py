@@ -1,8 +1,8 @@
 """Corner plots of samples and cases.
 
-The function ``corner_figure`` builds a corner plot of the primary output and the sampled fields: a
-triangle of scatter plots with histograms on its diagonal. The points of the other axes of the study
-are shown in different colours.
+The function ``build_corner_figure`` builds a corner plot of the primary output and the sampled
+fields: a triangle of scatter plots with histograms on its diagonal. The points of the other axes of
+the study are shown in different colours.
 """
 
 from __future__ import annotations
@@ -237,10 +237,10 @@ def draw_histogram(
     ----------
     variable_name : str
         Name of the variable.
-    colour_dimension : sequence of str
+    colour_dimensions : sequence of str
         Dimensions of the lattice. Each combination of their points has a separate histogram.
     dataset : xarray.Dataset
-        Dataset with the variable and with coordinates for the dimensions ``colour_dimension``.
+        Dataset with the variable and with coordinates for the dimensions ``colour_dimensions``.
     axes : matplotlib.axes.Axes
         Axes to draw on.
     """

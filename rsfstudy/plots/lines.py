@@ -1,7 +1,7 @@
 """Line plots of the variables of any study.
 
-The function ``panels`` builds one panel per variable. Each panel shows the variable against one
-axis of the study, with one line for each point of the other axes.
+The function ``build_panels_of_figure`` builds one panel per variable. Each panel shows the variable
+against one axis of the study, with one line for each point of the other axes.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Maps of a variable as a function of two numeric axes.
 
-The function ``panels`` builds one map for each point of the other axes of the study. A map shows
-the variable as colours with labelled contours. Lattice cells without a value are hatched according
-to their status. The module ``_figures`` chooses between maps, lines and scatter matrices.
+The function ``build_panels_of_figure`` builds one map for each point of the other axes of the
+study. A map shows the variable as colours with labelled contours. Lattice cells without a value are
+hatched according to their status. The module ``_figures`` chooses between maps, lines and scatter
+matrices.
 """
 
 from __future__ import annotations
@@ -125,7 +126,7 @@ def draw_map(
         Name of the variable.
     map_dimensions : tuple of (str, str)
         Names of the y axis and the x axis.
-    colour_scale : tuple of (matplotlib.colors.Normalize, sequence of float), or None
+    colour_scale_and_contour_levels : tuple of (matplotlib.colors.Normalize, sequence of float), or None
         Colour scale and contour levels. For a variable with flags, pass the flag values instead of
         contour levels. If the argument is None, the scale is computed from the values in the map.
     dataset : xarray.Dataset
@@ -266,7 +267,7 @@ def _hatch_cells_without_value_by_status(
         Axes to draw on.
     cell_edges : tuple of (ndarray, ndarray)
         Edges of the cells along x and along y.
-    status : ndarray, shape (ny, nx)
+    status_codes : ndarray, shape (ny, nx)
         Status codes of the cells.
     missing_mask : ndarray of bool, shape (ny, nx)
         True for the cells to be hatched.

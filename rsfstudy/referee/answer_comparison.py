@@ -74,7 +74,7 @@ class QuantityAgreement:
     first_failing_row : int or None
         Index of the first row with fewer correct digits than required, or None if all rows have
         enough correct digits.
-    agrees_to_written_digits : bool
+    agrees_within_rounding_error : bool
         True if all rows agree within the rounding error of the written values.
     relative_differences : ndarray, shape (n,)
         Relative difference between the answer and the known answer in each row.
@@ -217,9 +217,9 @@ def compare_answers(
     ----------
     problem : BenchmarkProblem
         Problem that both answers belong to.
-    answer : mapping of str to ndarray
+    known_answer : mapping of str to ndarray
         Columns of the known answer in SI units.
-    reported : mapping of str to ReportedQuantity
+    reported_quantities : mapping of str to ReportedQuantity
         Quantities that the other code reports.
     required_digits : float
         Number of correct digits that the answer needs to pass.

@@ -29,10 +29,10 @@ def compare_file_with_known_answer(
     ----------
     file : Path
         Table with the columns that the problem requests.
-    stated_problem : str
+    problem_number_or_path : str
         Number of a shipped problem, or path of a problem file. If the string is empty, the first
         two characters of the file name are the number of the problem.
-    columns : mapping of str to str, or None
+    column_by_quantity : mapping of str to str, or None
         Heading and units of the columns in the file, as for ``rsfstudy.read_table``. If the
         argument is None, the first line of the file must contain the names of the columns.
     required_digits : float
@@ -80,7 +80,7 @@ def summarise_answer_comparisons(answer_comparisons: Sequence[AnswerComparison])
 
     Parameters
     ----------
-    comparisons : sequence of AnswerComparison
+    answer_comparisons : sequence of AnswerComparison
         Comparison of each file.
 
     Returns

@@ -38,9 +38,9 @@ class ReportedQuantity(NamedTuple):
 
     Parameters
     ----------
-    values : ndarray, shape (n,)
+    si_values : ndarray, shape (n,)
         Values in SI units.
-    last_place_unit : float
+    last_place_unit_in_si : float
         One unit in the last decimal place of the values, in SI units. The attribute is 0 if all
         values are zero, or if the quantity was computed from another quantity.
     """

@@ -129,7 +129,7 @@ def build_failed_cells_table(dataset: xr.Dataset, results_file: str) -> TextTabl
     ----------
     dataset : xarray.Dataset
         Results of a study.
-    file : str
+    results_file : str
         Path of the results file.
 
     Returns

@@ -81,7 +81,7 @@ def build_motion_tables_and_sentences(
         Motion from ``rsfstudy.simulate``.
     scene : Scene
         Scene of the motion.
-    catalogue : xarray.Dataset
+    event_catalogue : xarray.Dataset
         Events of the motion.
 
     Returns

@@ -31,7 +31,7 @@ def build_record_events_tables_and_sentences(event_catalogue: xr.Dataset) -> lis
 
     Parameters
     ----------
-    catalogue : xarray.Dataset
+    event_catalogue : xarray.Dataset
         Result of ``rsfstudy.events``.
 
     Returns
@@ -77,7 +77,7 @@ def summarise_record_events_as_fields(event_catalogue: xr.Dataset) -> dict[str, 
 
     Parameters
     ----------
-    catalogue : xarray.Dataset
+    event_catalogue : xarray.Dataset
         Result of ``rsfstudy.events``.
 
     Returns

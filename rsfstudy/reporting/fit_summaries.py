@@ -204,7 +204,7 @@ def format_value_with_stderr(value: float, stderr: float) -> str:
 
     Parameters
     ----------
-    value, error : float
+    value, stderr : float
         Value and standard error.
 
     Returns

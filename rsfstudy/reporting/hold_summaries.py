@@ -37,7 +37,7 @@ def summarise_holds(hold_table: xr.Dataset) -> Iterator[TextTable | str]:
 
     Parameters
     ----------
-    table : xarray.Dataset
+    hold_table : xarray.Dataset
         Table of holds, as returned by ``rsfstudy.healing``.
 
     Yields

@@ -33,9 +33,9 @@ class TextTable:
         Caption of the table.
     wrappable_columns : collection of str, optional
         Headings of the columns that contain prose. Lines of prose may be broken between words.
-    row_colours : sequence of str, optional
+    last_cell_colours : sequence of str, optional
         Colour of the last cell of each row.
-    values : sequence of mapping of str to object, optional
+    unformatted_rows : sequence of mapping of str to object, optional
         Unformatted numbers and labels of each row, for JSON output.
     """
 
@@ -53,11 +53,11 @@ class TextTableColumn(NamedTuple):
     ----------
     heading : str
         Heading of the column.
-    variable : str
+    variable_name : str
         Name of the variable.
-    format : callable
+    format_function : callable
         Function that formats a value of the variable.
-    key : str, default: ""
+    unformatted_key : str, default: ""
         Key of the value in ``TextTable.values``. If the key is empty, the value is stored with the
         coordinates of the row.
     """

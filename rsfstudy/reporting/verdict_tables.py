@@ -28,8 +28,8 @@ def build_claims_table(verdicts: pd.DataFrame) -> TextTable | str:
     rows = verdicts.to_dict("records")
     if not any(row["verdict"] != Claim.NOT_APPLICABLE for row in rows):
         return (
-            f"{format_count_with_noun(len(rows), 'claim')} not checked: {format_verdict_counts(verdicts)}"
-            * bool(rows)
+            f"{format_count_with_noun(len(rows), 'claim')} not checked: "
+            f"{format_verdict_counts(verdicts)}" * bool(rows)
         )
     colours = [
         "red" if row["verdict_changed"] else "green" if row["verdict"] == "reproduced" else "yellow"

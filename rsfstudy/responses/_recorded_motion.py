@@ -102,7 +102,7 @@ def record_motion_until_peak(
         Scene of the motion.
     integrator : Integrator
         Integrator with the requested accuracy.
-    specifications : sequence of EventSpecification
+    event_specs : sequence of EventSpecification
         Specification of the extremum, followed by other events that may end the motion.
     first_segment : int
         Index of the loading segment at which the record begins.

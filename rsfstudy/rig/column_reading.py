@@ -97,7 +97,7 @@ class ColumnsReadFromSource(NamedTuple):
         Columns by name, with their units. All values are finite.
     table : Table
         Table from which the columns were read.
-    processing : list of str
+    row_selection_descriptions : list of str
         Descriptions of the row selection that was applied.
     """
 
@@ -120,9 +120,9 @@ def read_columns(
         Path of a file in any known format, or object that contains the columns.
     selected_columns : mapping of str to str or tuple, or None
         Heading and units of columns by name.
-    usable : UsableColumns
+    usable_columns : UsableColumns
         Columns that the calling function can use.
-    options : ReadingOptions
+    reading_options : ReadingOptions
         Reading options.
 
     Returns

@@ -37,10 +37,10 @@ class ColumnSelection(NamedTuple):
         Heading of the column.
     units : str, default: ""
         Units of the column.
-    scale : float, default: 1.0
+    scale_factor : float, default: 1.0
         Factor by which the numbers in the file are multiplied.
     offset : float, default: 0.0
-        Number to add to each value after the multiplication by ``scale``.
+        Number to add to each value after the multiplication by ``scale_factor``.
     """
 
     heading: str
@@ -168,7 +168,7 @@ class Column(NamedTuple):
         Values of the column, as an array of shape (rows,). Empty fields are NaN.
     units : str
         Units of the values.
-    column_number : int, default: 0
+    one_based_column_number : int, default: 0
         Number of the column in the file, counted from 1.
     line_numbers : ndarray, optional
         Line number of each value in the file.
@@ -187,7 +187,7 @@ class Column(NamedTuple):
 
         Parameters
         ----------
-        row : int
+        row_index : int
             Index of the value.
 
         Returns
@@ -197,7 +197,10 @@ class Column(NamedTuple):
         """
         if not self.path:
             return f"sample {row_index + 1}"
-        return f"{self.path}, line {self.line_numbers[row_index]}, column {self.one_based_column_number}"
+        return (
+            f"{self.path}, line {self.line_numbers[row_index]}, column "
+            f"{self.one_based_column_number}"
+        )
 
     def raise_for_invalid_values(
         self, quantity_name: str, invalid_mask: np.ndarray, rule: str

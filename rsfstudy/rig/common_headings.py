@@ -57,7 +57,7 @@ class UsableColumns(NamedTuple):
 
     Parameters
     ----------
-    names : tuple of str
+    column_names : tuple of str
         Names of the columns, in the order of the search. The function searches the headings for
         each column. The columns ``slip`` and ``displacement`` are alternatives, and so are
         ``shear_stress`` and ``friction``. If the function has found one column of a pair, it does
@@ -111,7 +111,7 @@ def read_selected_columns(
     selected_columns : mapping of str to str or tuple, or None
         Heading and units of columns by name. If the value is None and the arrays in memory have no
         units, all columns are read.
-    usable : UsableColumns
+    usable_columns : UsableColumns
         Columns that the calling function can use.
 
     Returns

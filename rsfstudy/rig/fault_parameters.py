@@ -14,7 +14,7 @@ def replace_b_by_b_over_a(scene_fields: Mapping[str, Any]) -> dict[str, Any]:
 
     Parameters
     ----------
-    fields : mapping of str to object
+    scene_fields : mapping of str to object
         Scene fields with ``a`` and ``b``.
 
     Returns

@@ -26,7 +26,7 @@ def expand_range(
     ----------
     argument_name : str
         Name of the argument for error messages.
-    text : str
+    argument_text : str
         Complete argument, for error messages.
     range_text : str
         Range as ``first:last:count`` or ``first:last:count:log``, optionally followed by units.

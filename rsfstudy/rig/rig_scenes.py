@@ -247,14 +247,14 @@ def convert_scene_and_axes_to_rig(
     ----------
     rig : Rig
         Rig that determines the scales.
-    base : Scene
+    base_scene : Scene
         Dimensionless scene.
     axes : sequence of Axis
         Dimensionless axes.
 
     Returns
     -------
-    base : Scene
+    base_scene : Scene
         Scene with the fields that the rig determines.
     axes : list of Axis
         Axes with physical units.

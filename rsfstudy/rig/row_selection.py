@@ -212,7 +212,7 @@ def parse_filter(filter_text: str) -> Filter | None:
 
     Parameters
     ----------
-    text : str
+    filter_text : str
         Kind of filter, and averaging time or corner frequency, such as "mean 1 s" or
         "butterworth_2 2 Hz".
 

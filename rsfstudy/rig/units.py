@@ -123,7 +123,7 @@ def convert_to_si(quantity_name: str, value: Any, si_units: str) -> float:
     value : float, str or pint.Quantity
         Value to convert. A plain number is already in SI units. A string is a number followed by a
         unit, for example "5 MPa", "0.1 MPa/um" or "1 um s^-1".
-    units : str
+    si_units : str
         SI units of the quantity.
 
     Returns
@@ -148,7 +148,7 @@ def convert_to_si_as_fraction(quantity_name: str, value: Any, si_units: str) -> 
         Name of the quantity for error messages.
     value : float, str or pint.Quantity
         Value to convert, as in `convert_to_si`.
-    units : str
+    si_units : str
         SI units of the quantity.
 
     Returns

@@ -28,12 +28,13 @@ has its own data structure:
 2. Friction: ``friction.FrictionFunctions`` combines the functions of the law, the normal stress,
    the fluid and the loading into the friction relation and the evolution of all states
    (``scene.friction_functions``).
-3. Equations: ``equations.Equations`` holds the rates, unknowns and parameters of a scene in one
+3. Equations: ``equations.EquationsOfMotion`` holds the rates, unknowns and parameters of a scene in
+one
    regime. The functions for the rates and for the points are built from the friction functions and
-   from the functions of the dynamics. The SciPy integrators call ``Equations.rate_function``
-   directly.
+   from the functions of the dynamics. The SciPy integrators call
+   ``EquationsOfMotion.rate_function`` directly.
 4. In-place functions: ``motion.in_place_functions.InPlaceFunctions`` converts the functions of
-   ``Equations``, which take and return tuples, to functions that fill arrays.
+   ``EquationsOfMotion``, which take and return tuples, to functions that fill arrays.
 5. Table: ``MotionDriver`` passes a function table with one row per regime to the event loop. A row
    contains the in-place functions, or the addresses of the compiled functions.
 

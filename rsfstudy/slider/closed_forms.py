@@ -22,11 +22,11 @@ class ClosedForm:
 
     Parameters
     ----------
-    formula : str
+    formula_text : str
         Formula for display.
     scene_field_names : tuple of str
         Names of the scene fields that the formula depends on, in the order of the arguments.
-    function : callable
+    formula_function : callable
         Function that evaluates the formula.
     literature_citation : str
         Reference for the formula.

@@ -53,7 +53,7 @@ class EquationsOfMotion(NamedTuple):
         as a change of :math:`\ln V` by 1.
     rate_function : callable
         Function ``rate(state, p) -> tuple`` that returns the derivatives of the unknowns.
-    point_function : callable
+    motion_point_function : callable
         Function ``point(state, derivatives, p) -> MotionPoint``.
     parameters : tuple of float
         Parameters ``p`` of the scene.

@@ -26,7 +26,8 @@ _SIMULATION_DURATION_HINT = "Pass the duration to rsfstudy.simulate(scene, durat
 def _hint_for_rig_quantity(symbol: str, rig_quantity_name: str) -> str:
     """Return an error hint for a rig quantity that is not a scene field."""
     return (
-        f"The quantity {symbol} belongs to a rig. Pass Rig({rig_quantity_name}=...). In a study with a rig, "
+        f"The quantity {symbol} belongs to a rig. Pass Rig({rig_quantity_name}=...). In "
+        "a study with a rig, "
         f"{rig_quantity_name} can also be an axis or an override."
     )
 
@@ -108,7 +109,7 @@ def replace_law_alias_by_law_name(law_name_or_alias: str) -> str:
 
     Parameters
     ----------
-    law_name : str
+    law_name_or_alias : str
         Name or synonym of a law.
 
     Returns
@@ -134,7 +135,7 @@ def hint_for_unknown_part_name(slot_name: str, value: Any, valid_part_names: Ite
         Name of the slot, for example ``law``.
     value : object
         Value that the user passed.
-    choices : iterable of str
+    valid_part_names : iterable of str
         Valid choices of the slot.
 
     Returns
@@ -164,7 +165,7 @@ def hint_for_positional_argument(
     ----------
     value : object
         Value that the user passed without a field name.
-    choices_by_slot_name : mapping of str to iterable of str
+    part_names_by_slot_name : mapping of str to iterable of str
         Valid choices of each slot.
 
     Returns

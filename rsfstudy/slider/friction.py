@@ -57,7 +57,7 @@ class FrictionFunctions(NamedTuple):
         of the pore pressure in the fault. A laboratory rig measures this effective normal stress.
     boundary_pressure : callable
         Function ``(psis) -> P`` that returns the pore pressure outside the fault.
-    evolutions : callable
+    state_evolutions : callable
         Function ``(log_slip_rate, psis, shift, fraction, p)`` that returns the derivatives of all
         states with respect to slip in :math:`D_c`, multiplied by ``fraction``.
     steady_states : callable
@@ -67,10 +67,10 @@ class FrictionFunctions(NamedTuple):
     state_variable : callable
         Function ``(difference, psis, p)`` that returns the state variable :math:`\Theta` from the
         difference between the sum of the states of the law and the shift.
-    state_contribution : callable
+    state_contribution_to_friction : callable
         Function ``(changes, g, psis, p)`` that returns the contribution of state changes to the
-        friction relation, so that ``a d ln V = strength'(g) dg - state_contribution``.
-    pressure_derivatives : callable
+        friction relation, so that ``a d ln V = strength'(g) dg - state_contribution_to_friction``.
+    strength_derivatives_by_pressure : callable
         Function ``(g, psis, p)`` that returns the derivatives of strength and of the shift with
         respect to the pore pressure.
     states_from_strength : callable
@@ -86,8 +86,8 @@ class FrictionFunctions(NamedTuple):
     indices_of_states_in_distance : tuple of int
         Indices of the states from which the distance from steady sliding is computed.
     spring_stress_rate : callable
-        Function ``(load, slip, velocity_ratios, p)`` that returns the derivative of the spring
-        stress with respect to displacement, including noise.
+        Function ``(load, slip, compute_velocity_ratios, p)`` that returns the derivative of the
+        spring stress with respect to displacement, including noise.
     """
 
     strength: NumericFunction
@@ -198,10 +198,10 @@ def _build_functions_of_frictional_stress(
 ) -> tuple[NumericFunction, NumericFunction, NumericFunction, NumericFunction]:
     """Build the friction functions whose argument is the frictional stress.
 
-    The argument ``last_unknown`` is ``"pressure"``, ``"load point"`` or an empty string. This
-    argument specifies the last element of the tuple of states. The function returns the first three
-    functions of ``FrictionFunctions``, and a function for the derivatives with respect to the last
-    unknown.
+    The argument ``kind_of_last_unknown`` is ``"pressure"``, ``"load point"`` or an empty string.
+    This argument specifies the last element of the tuple of states. The function returns the first
+    three functions of ``FrictionFunctions``, and a function for the derivatives with respect to the
+    last unknown.
     """
     effect = (
         reduce(friction_relation.build_sum_of_two_state_effects, state_effect_functions)

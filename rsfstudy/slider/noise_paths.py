@@ -44,7 +44,7 @@ class UnitNoisePath(NamedTuple):
     ----------
     seed : int
         Seed of the random numbers.
-    stream : int
+    stream_number : int
         Stream number. Paths with the same seed but different stream numbers are independent.
     correlation_time : float or None
         Correlation time :math:`t_c`, or None for a Wiener process.
@@ -61,11 +61,11 @@ class UnitNoisePath(NamedTuple):
 
         Parameters
         ----------
-        interval : float
+        sampling_interval : float
             Sampling interval.
-        first : int
-            Index of the first sample, whose time is ``first * interval``.
-        count : int
+        first_sample_index : int
+            Index of the first sample, whose time is ``first_sample_index * sampling_interval``.
+        sample_count : int
             Number of samples.
 
         Returns
@@ -83,7 +83,7 @@ class UnitNoisePath(NamedTuple):
     def _compute_samples_at_bisection_level(
         self, base_interval: float, level: int, first_sample_index: int, stop_sample_index: int
     ) -> np.ndarray:
-        """Return the path at the times ``i * base/2**level`` for first <= i < stop."""
+        """Return the path at the times ``i * base_interval/2**level`` for first <= i < stop."""
         if level == 0:
             return self._compute_samples_at_base_interval(base_interval, stop_sample_index)[
                 first_sample_index:
@@ -164,15 +164,15 @@ def iterate_segment_table_blocks(
 
     Parameters
     ----------
-    start, end : float
+    start_time, end_time : float
         Start and end of a loading segment in :math:`D_c/V_*`. The end may be infinite.
-    velocity : float
+    load_velocity : float
         Load point velocity :math:`V_0/V_*` during the loading segment.
-    interval : float
+    sampling_interval : float
         Sampling interval of the noise.
-    shear : tuple of (Path, float)
+    shear_stress_path_and_amplitude : tuple of (Path, float)
         Path and amplitude of the noise of shear stress.
-    normal : tuple of (Path, float) or None
+    normal_stress_path_and_amplitude : tuple of (Path, float) or None
         Path and amplitude of the noise of normal stress.
 
     Yields

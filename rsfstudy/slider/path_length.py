@@ -112,7 +112,7 @@ def compute_spring_stress_rate(
 
     Parameters
     ----------
-    load, slip : float
+    relative_load_velocity, relative_slip_rate : float
         Load point velocity and slip rate, divided by the magnitude of the slip rate.
     velocity_ratio_values : tuple of float
         Output of `velocity_ratios`.

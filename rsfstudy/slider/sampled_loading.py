@@ -66,7 +66,7 @@ class SampledHistory(UserLoading):
     ----------
     name : str
         Name of the history in results.
-    samples : bytes
+    sample_table_bytes : bytes
         Array of shape (samples, 4) as bytes. The columns are time, load point velocity, decrease in
         normal stress, and the rate of this decrease.
     digest : str
@@ -77,7 +77,7 @@ class SampledHistory(UserLoading):
         If True, the samples include pore pressure but not normal stress. If the scene has a fluid
         with pore pressure, the samples specify the pressure around the fault. Fluid then flows
         until the pore pressure in the fault equals the pressure around the fault.
-    first_reversal : tuple of (str, float, str), optional
+    first_load_point_reversal : tuple of (str, float, str), optional
         Name, value and position of the first sample that moves the load point backwards. Error
         messages contain this information.
     """
@@ -123,7 +123,7 @@ class SampledHistory(UserLoading):
             Name of the history in results.
         of_pressure : bool, default: False
             If True, pore pressure is the only cause of the decrease in effective normal stress.
-        first_reversal : tuple of (str, float, str), optional
+        first_load_point_reversal : tuple of (str, float, str), optional
             Name, value and position of the first sample that moves the load point backwards.
 
         Returns
@@ -190,7 +190,7 @@ class SampledHistory(UserLoading):
     def describe_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
         """Describe the input value that moves the load point backwards.
 
-        See ``UserLoading.locate_load_point_reversal``.
+        See ``UserLoading.describe_load_point_reversal``.
         """
         velocity = float(self.sample_table[segment_index, VELOCITY_COLUMN])
         return self.first_load_point_reversal or (

@@ -1,7 +1,7 @@
 """Assembly of the parts of a scene from its fields.
 
-The function ``build_parts`` creates the parts, and ``build_field_index`` assigns each field to its
-part.
+The function ``build_scene_parts`` creates the parts, and ``build_field_index`` assigns each field
+to its part.
 """
 
 from __future__ import annotations
@@ -206,16 +206,16 @@ class FieldIndex(NamedTuple):
     rejecting_part_class_by_field : mapping of str to type
         Class of the part that rejects each field, by field name. The mapping contains the fields
         that do not belong to any part of the scene.
-    values_of_inactive_fields : mapping of str to object
+    value_by_inactive_field : mapping of str to object
         Values of the fields that do not belong to any part of the scene.
-    inapplicable_fields : frozenset of str
+    inapplicable_field_names : frozenset of str
         Names of the fields that do not apply to the scene, whatever their values are. Fields that
         would select another part are not included.
     names_of_slots_chosen_by_name : tuple of str
         Names of the slots whose parts are selected by name.
     all_field_names : tuple of str
         Names of all fields, including the fields of user-defined parts.
-    fields_not_selecting_a_part : frozenset of str
+    names_of_fields_not_selecting_a_part : frozenset of str
         Names of the fields that do not select a part.
     """
 

@@ -62,7 +62,7 @@ def compute_critical_stiffness(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     quasi_static : bool, default: False
         If True, the function ignores inertia and radiation damping. The property
-        ``Scene.critical_stiffness`` is computed with this option at :math:`V_*`.
+        ``Scene.compute_critical_stiffness`` is computed with this option at :math:`V_*`.
 
     Returns
     -------
@@ -227,9 +227,9 @@ class GrowthRateWithError(NamedTuple):
 
     Parameters
     ----------
-    value : float
+    real_part : float
         Real part of the growth rate, per unit slip in :math:`D_c`.
-    error : float
+    error_estimate : float
         Error estimate of the real part.
     """
 

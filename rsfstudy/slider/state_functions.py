@@ -104,7 +104,7 @@ def return_isothermal_state_variable(
 
     Parameters
     ----------
-    difference : float
+    state_sum_minus_shift : float
         Sum of the states of the law minus the shift, :math:`\sum_i \Psi_i - \mathrm{shift}`.
     psis : tuple of float
         States of the scene. This argument is ignored.
@@ -114,7 +114,7 @@ def return_isothermal_state_variable(
     Returns
     -------
     float
-        State variable :math:`\Theta`, which is equal to ``difference``.
+        State variable :math:`\Theta`, which is equal to ``state_sum_minus_shift``.
     """
     return state_sum_minus_shift
 
@@ -127,7 +127,7 @@ def combine_law_and_auxiliary_rates(
 
     Parameters
     ----------
-    law_evolutions : callable
+    law_state_rates : callable
         Function ``evolutions`` of the law.
     auxiliary_rates : callable
         Function ``auxiliary_rates`` of the fluid or the loading.

@@ -59,8 +59,8 @@ _MAX_SECANT_COUNT, _ROOT_TOLERANCE, _STAGNATION_TOLERANCE = 30, 1e-14, 1e-10
 class _TemperatureIndices(NamedTuple):
     """Indices of the temperature in the tuples of states and parameters.
 
-    The index of the state is negative. The index ``end`` is one greater than the index of the last
-    parameter.
+    The index of the state is negative. The index ``parameter_end_index`` is one greater than the
+    index of the last parameter.
     """
 
     state_index: int
@@ -77,7 +77,7 @@ def build_temperature_dependent_functions(
     ----------
     scene : Scene
         Scene whose temperature is an unknown.
-    isothermal : mapping of str to object
+    isothermal_functions : mapping of str to object
         Attributes of the ``FrictionFunctions`` that the scene would have at constant temperature.
 
     Returns
@@ -131,7 +131,7 @@ def compute_inverse_temperature_change(temperature_rise: float) -> float:
 
     Parameters
     ----------
-    rise : float
+    temperature_rise : float
         Temperature rise :math:`\vartheta`.
 
     Returns
@@ -149,9 +149,9 @@ def compute_derivatives_by_temperature(
 
     Parameters
     ----------
-    rise : float
+    temperature_rise : float
         Temperature rise :math:`\vartheta`.
-    parameters : tuple of float
+    temperature_parameters : tuple of float
         Parameters of the temperature, which start with :math:`a q_a` and :math:`b q_b`.
 
     Returns
@@ -327,8 +327,8 @@ def _insert_nan_for_steady_temperature(
 ) -> NumericFunction:
     """Return a steady-state function that sets the temperature rise to NaN.
 
-    The temperature rise is not computed here, because ``steady_temperature_rise`` would have to
-    solve an equation, and because the distance from steady sliding does not depend on the
+    The temperature rise is not computed here, because ``compute_steady_temperature_rise`` would
+    have to solve an equation, and because the distance from steady sliding does not depend on the
     temperature rise.
     """
 

@@ -197,7 +197,7 @@ def _parse_segment(
     """Convert an input segment to a validated ``Segment``.
 
     The argument ``previous_normal_stress`` is the normal stress of the previous segment, and
-    ``location`` is the position of the segment in error messages.
+    ``segment_position_text`` is the position of the segment in error messages.
     """
     try:
         if isinstance(declared_segment, Segment):

@@ -184,7 +184,7 @@ class CellJournal:
 
         Parameters
         ----------
-        cells : iterable of StoredCellRow
+        journal_rows : iterable of StoredCellRow
             Rows of the finished cells. If the journal already contains a row with the same key, the
             new row replaces this row.
 
@@ -306,7 +306,7 @@ class CellWallTimes:
 
     Parameters
     ----------
-    fingerprint : mapping of str to object
+    run_fingerprint : mapping of str to object
         Fingerprint of the journal.
     seconds_by_cell_key : mapping of bytes to float
         Wall time in s by cell key. The mapping omits cells whose wall time is not in the journal.
@@ -321,7 +321,7 @@ class CellWallTimes:
 
         Parameters
         ----------
-        path : Path
+        journal_path : Path
             Path of the journal.
 
         Returns

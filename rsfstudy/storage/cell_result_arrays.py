@@ -1,7 +1,8 @@
 """Conversion of finished cells to journal rows and to column arrays.
 
-The class ``OutputPacker`` converts the outcome of a cell to a row of the journal. ``CellColumns``
-contains arrays with the results of many cells. Datasets are assembled from these arrays.
+The class ``CellOutputPacker`` converts the outcome of a cell to a row of the journal.
+``CellResultArrays`` contains arrays with the results of many cells. Datasets are assembled from
+these arrays.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ class CellResultArrays:
     wall_times : ndarray of float, shape (n,)
         Wall times in s. The wall time of a pending cell is NaN.
     packed_outputs : ndarray of float, shape (n, m)
-        Outputs of each cell, in the layout of ``OutputPacker``.
+        Outputs of each cell, in the layout of ``CellOutputPacker``.
     """
 
     statuses: np.ndarray

@@ -70,7 +70,7 @@ def merge_fingerprints(
 
     Parameters
     ----------
-    stored, current : mapping of str to object
+    stored_fingerprint, run_fingerprint : mapping of str to object
         Fingerprints of the journal and of the run. The code of both fingerprints must agree.
 
     Returns

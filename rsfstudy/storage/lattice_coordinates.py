@@ -1,8 +1,8 @@
 """Coordinates of the lattice of a study.
 
 Each field that varies along an axis becomes a coordinate of this axis. Each fixed scene field
-becomes a scalar coordinate. ``LatticeCoordinates`` reads the values of the fields from the scenes
-of a few cells. ``CellPlan`` collects these scenes when it builds the scenes of all cells.
+becomes a scalar coordinate. ``LatticeCoordinatesBuilder`` reads the values of the fields from the
+scenes of a few cells. ``CellPlan`` collects these scenes when it builds the scenes of all cells.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class LatticeCoordinatesBuilder:
 
         Parameters
         ----------
-        scenes : mapping of int to Scene
+        scenes_by_cell_number : mapping of int to Scene
             Scenes of the cells in ``cell_numbers``.
 
         Returns

@@ -1,7 +1,7 @@
 """Assembly of finished cells into a self-describing dataset.
 
-``assemble_dataset`` assembles the dataset of a complete lattice. For Zarr stores, the functions
-that build the variables are called for one block of cells at a time. The module
+``assemble_study_dataset`` assembles the dataset of a complete lattice. For Zarr stores, the
+functions that build the variables are called for one block of cells at a time. The module
 ``lattice_coordinates`` builds the coordinates.
 """
 
@@ -55,8 +55,8 @@ def assemble_study_dataset(
     study : Study
         Study whose cells are assembled.
     coordinates : mapping of str to tuple or xarray.Variable
-        Coordinates of the lattice (see ``LatticeCoordinates``).
-    cell_columns : CellColumns
+        Coordinates of the lattice (see ``LatticeCoordinatesBuilder``).
+    cell_arrays : CellColumns
         Columns of all cells, in row-major order.
     provenance : mapping of str to object
         Provenance of the run, as plain data (see ``execution.provenance.collect_provenance``).
@@ -83,7 +83,7 @@ def build_lattice_variables(
     ----------
     study : Study
         Study to which the cells belong.
-    cell_columns : CellColumns
+    cell_arrays : CellColumns
         Columns of the cells in the block, in row-major order.
     block_shape : tuple of int
         Shape of the block.

@@ -176,7 +176,7 @@ def construct_from_field_values(
     ----------
     constructor : callable
         Function or class that accepts the fields as keyword arguments.
-    values : mapping of str to object
+    field_values : mapping of str to object
         Values of the fields.
     path_in_file : str
         Path of the values in the file, for error messages.

@@ -1,6 +1,6 @@
 """Comparison of results datasets.
 
-``compare_same_lattice`` compares two datasets of the same study variable by variable.
+``compare_results_of_same_study`` compares two datasets of the same study variable by variable.
 ``compare_results`` compares the results of any two studies, and also compares the declarations,
 versions and machines.
 """
@@ -168,7 +168,7 @@ class ResultsComparison:
         statuses in the first and in the second dataset.
     agreement_table : pandas.DataFrame
         Comparison of the variables in the cells that are finished in both datasets. The function
-        ``compare_same_lattice`` documents the columns. If the primary output has no error
+        ``compare_results_of_same_study`` documents the columns. If the primary output has no error
         estimates, every pair of different values of the primary output is counted in
         ``beyond_errors``.
     uncompared_variables : mapping of str to str
@@ -265,7 +265,7 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> ResultsComparison:
 def _add_axes_of_other_dataset(dataset: xr.Dataset, other_dataset: xr.Dataset) -> xr.Dataset:
     """Add the missing axes to a dataset.
 
-    If ``other`` has axes that ``dataset`` does not have, the function adds these axes to
+    If ``other_dataset`` has axes that ``dataset`` does not have, the function adds these axes to
     ``dataset``. Each added axis has a single point, which is the fixed value of the coordinate in
     ``dataset``.
     """

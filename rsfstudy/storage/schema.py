@@ -1,8 +1,8 @@
 """Schema and checks of results files: attributes, provenance and variables.
 
-``check_results`` checks a file before any other function uses the file. Error messages contain the
-path of the invalid entry, for example ``declaration.claims[3].id``. The module ``declarations``
-contains the schema of the declaration.
+``check_results_dataset`` checks a file before any other function uses the file. Error messages
+contain the path of the invalid entry, for example ``declaration.claims[3].id``. The module
+``declarations`` contains the schema of the declaration.
 """
 
 from __future__ import annotations

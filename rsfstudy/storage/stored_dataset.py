@@ -110,7 +110,7 @@ class StoredDataset:
 
         Parameters
         ----------
-        description : str
+        file_description : str
             Description of the file or dataset for the error message.
         """
         schema.check_contains_study_results(self.dataset, file_description)

@@ -225,7 +225,7 @@ def build_scene_from_stored_fields(
 
     Parameters
     ----------
-    stored_scene : mapping of str to object
+    stored_fields : mapping of str to object
         Fields of the scene.
     user_parts : mapping of str to UserPart, optional
         User-defined parts by name.
@@ -290,7 +290,7 @@ def build_rig(rig_quantities: Mapping[str, float]) -> Rig:
 
     Parameters
     ----------
-    quantities : mapping of str to float
+    rig_quantities : mapping of str to float
         Quantities that have a value, in SI units.
 
     Returns
@@ -312,7 +312,7 @@ def build_measure(measure_declaration: Mapping[str, Any], path_in_file: str) -> 
 
     Parameters
     ----------
-    plain_measure : mapping of str to object
+    measure_declaration : mapping of str to object
         Description of the measure. The description of a nested measure has the key ``measure``.
     path_in_file : str
         Path of the description in the file, for error messages.
@@ -347,7 +347,7 @@ def build_reduction(reduction_declaration: Mapping[str, Any], path_in_file: str)
 
     Parameters
     ----------
-    plain_reduction : mapping of str to object
+    reduction_declaration : mapping of str to object
         Description of the reduction.
     path_in_file : str
         Path of the description in the file, for error messages.

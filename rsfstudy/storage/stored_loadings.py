@@ -96,7 +96,8 @@ def read_user_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
         ):
             raise build_invalid_entry_error(
                 str(key),
-                f"is not the table of a loading with {SampledHistory.SAMPLE_TABLE_COLUMN_COUNT} columns",
+                "is not the table of a loading with "
+                f"{SampledHistory.SAMPLE_TABLE_COLUMN_COUNT} columns",
             )
         if "of_stress" in values.attrs:
             of = {

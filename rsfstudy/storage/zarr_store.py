@@ -103,7 +103,7 @@ class ZarrStore:
         coordinates : mapping of str to tuple or xarray.Variable
             Coordinates of the lattice.
         read_cells : callable
-            Function that returns the ``CellColumns`` of a slice of cells, in row-major order.
+            Function that returns the ``CellResultArrays`` of a slice of cells, in row-major order.
         provenance : mapping of str to object
             Provenance of the run, as plain data.
         apply_reductions : callable

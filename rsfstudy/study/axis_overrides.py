@@ -60,7 +60,7 @@ def replace_field_values(axis: Axis, field_name: str, new_values: Sequence[Any])
         Axis that sets several fields at each point.
     field_name : str
         Name of the field to override. Points that do not set this field remain unchanged.
-    values : sequence
+    new_values : sequence
         New values. A numbered axis accepts exactly one value.
 
     Returns
@@ -162,7 +162,7 @@ def convert_to_plain_values(field_name: str, value_or_list: Any) -> Any:
     ----------
     field_name : str
         Name of the field.
-    value : object
+    value_or_list : object
         Value or list of values.
 
     Returns

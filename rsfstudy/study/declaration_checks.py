@@ -139,7 +139,7 @@ def check_user_field_names_are_unused(
         Measure of the study.
     reductions : sequence of Reduction
         Reductions of the study.
-    user_field_names : sequence of str
+    scene_field_names : sequence of str
         Names of all scene fields. The fields of user-defined parts follow the built-in fields.
 
     Raises
@@ -174,7 +174,7 @@ def check_axis_fields_and_units(
         Axes of the study.
     scene_field_names : sequence of str
         Names of all scene fields.
-    scenes_on_rig : LatticeScenesOnRig or None
+    axis_unit_converter : LatticeScenesOnRig or None
         Converter of axis values with units, or None if the study has no rig.
 
     Raises
@@ -330,7 +330,7 @@ def build_unknown_name_error(
         Name of the argument that contains the unknown name.
     unknown_name : str
         Unknown name.
-    rule : str
+    violated_rule : str
         Rule that the name violates.
     known_names : collection of str
         Known names. The error message lists similar known names, unless there is a hint for the

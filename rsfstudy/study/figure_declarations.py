@@ -234,14 +234,14 @@ def reference_line(
 
     Parameters
     ----------
-    x : str
+    x_variable : str
         Name of the variable along x.
     function : callable
         Function of the x values that returns the y values.
-    name : str
+    legend_label : str
         Legend entry.
-    start : float, optional
-        First x value of the line. The default is the smallest value of the variable ``x``.
+    min_x : float, optional
+        First x value of the line. The default is the smallest value of the variable ``x_variable``.
     **style : object
         Keyword arguments for `matplotlib.axes.Axes.plot`.
 

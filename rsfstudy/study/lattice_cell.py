@@ -17,7 +17,7 @@ class Cell(NamedTuple):
     ----------
     scene : Scene
         Scene of the cell.
-    measure_changes : dict of str to object
+    measure_field_changes : dict of str to object
         Values of the measure fields that the axes change.
     """
 
@@ -30,9 +30,9 @@ class CellFieldChanges(NamedTuple):
 
     Parameters
     ----------
-    scene_fields : dict of str to object
+    scene_field_changes : dict of str to object
         Scene fields that differ from the base scene.
-    measure_fields : dict of str to object
+    measure_field_changes : dict of str to object
         Measure fields that differ from the measure of the study.
     """
 

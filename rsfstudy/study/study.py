@@ -278,7 +278,7 @@ class Study:
 
         Parameters
         ----------
-        row : mapping of str to object
+        axis_row : mapping of str to object
             Axis values by field, without fields of the measure.
 
         Returns
@@ -430,7 +430,7 @@ class Study:
 
         Parameters
         ----------
-        rows : sequence of mapping of str to object
+        axis_rows : sequence of mapping of str to object
             Field values at one point of each axis.
 
         Returns

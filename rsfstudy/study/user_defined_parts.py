@@ -16,9 +16,9 @@ def find_user_parts_in_axis_rows(
 
     Parameters
     ----------
-    names : iterable of str
+    field_names : iterable of str
         Names of the fields to examine.
-    rows : iterable of mapping of str to object
+    axis_rows : iterable of mapping of str to object
         Field values.
 
     Returns
@@ -40,7 +40,7 @@ def list_user_field_quantities(user_parts: Iterable[UserPart]) -> Iterator[Quant
 
     Parameters
     ----------
-    parts : iterable of type or UserLoading
+    user_parts : iterable of type or UserLoading
         User-defined parts.
 
     Returns

@@ -8,7 +8,7 @@ function with the name of the module:
 - The docstring of the function is the help text.
 - The function creates a result object, prints the result and returns the exit status. If the
   command has the option ``--json``, the result is a subclass of ``CommandResult``, and
-  ``output_result`` prints the result as text or as JSON.
+  ``print_result_as_text_or_json`` prints the result as text or as JSON.
 - Large libraries are imported inside the functions that use them, because ``rsfstudy --help``
   imports all modules of this package. A command never imports the module of another command.
 """

@@ -32,17 +32,17 @@ class CheckCommandResult(CommandResult):
 
     Parameters
     ----------
-    studies : sequence of StudyResults
+    study_results : sequence of StudyResults
         Results of the studies that have been run.
     verdicts : pandas.DataFrame or None
         Table of the claims and their verdicts, or None if there are no results.
-    unapplied_claims : sequence of str, optional
+    inapplicable_claim_ids : sequence of str, optional
         Identifiers of the requested claims that do not apply to the results.
-    skipped : mapping of str to str, optional
+    skip_reason_by_study : mapping of str to str, optional
         Reason for skipping a study, by name of the study. The command reports a skipped study but
         does not fail.
-    not_run : sequence of str, optional
-        Names of the studies that have no results and are not in ``skipped``.
+    study_names_without_results : sequence of str, optional
+        Names of the studies that have no results and are not in ``skip_reason_by_study``.
     """
 
     study_results: Sequence[StudyResults]

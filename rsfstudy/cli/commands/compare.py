@@ -38,7 +38,7 @@ class CompareCommandResult(CommandResult):
 
     Parameters
     ----------
-    files : sequence of Path
+    results_files : sequence of Path
         Paths of both files.
     provenance : sequence of mapping of str to object
         Provenance of both files.

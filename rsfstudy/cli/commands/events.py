@@ -30,9 +30,9 @@ class EventsCommandResult(CommandResult):
 
     Parameters
     ----------
-    files : sequence of Path
+    record_files : sequence of Path
         Files of the records.
-    catalogues : sequence of xarray.Dataset
+    event_catalogues : sequence of xarray.Dataset
         Stress drops in each record.
     """
 

@@ -51,9 +51,9 @@ class FitCommandResult(CommandResult):
     ----------
     records : sequence of Record
         Records with their detected steps.
-    dataset : xarray.Dataset
+    fit_dataset : xarray.Dataset
         Dataset of the fits.
-    files : sequence of Path
+    output_files : sequence of Path
         Paths of the figure and the data file.
     """
 

@@ -36,11 +36,11 @@ class HealingCommandResult(CommandResult):
     ----------
     record : Record
         Record of the holds.
-    table : xarray.Dataset
+    hold_table : xarray.Dataset
         Table of the holds.
-    stiffness : xarray.Dataset
+    machine_stiffness : xarray.Dataset
         Stiffness of the machine, measured in the record.
-    files : sequence of Path
+    output_files : sequence of Path
         Figure and data file.
     """
 

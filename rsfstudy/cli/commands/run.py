@@ -38,19 +38,19 @@ class StudyRunOutcome:
 
     Parameters
     ----------
-    study : str
+    study_name : str
         Name of the study.
-    seconds : float, optional
+    elapsed_seconds : float, optional
         Elapsed time in s, or None if the study was skipped.
     results : StudyResults, optional
         Results of the study, or None if the run was skipped or did not finish.
     verdicts : pandas.DataFrame, optional
         Verdicts on the claims, or None if the run was skipped or did not finish.
-    problems : sequence of str, optional
+    failure_descriptions : sequence of str, optional
         Descriptions of failed cells, of changed verdicts, and of a figure that could not be drawn.
-    files : sequence of Path, optional
+    output_files : sequence of Path, optional
         Paths of the results file and the figure.
-    message : str, optional
+    reason_for_missing_results : str, optional
         Reason why the study was skipped, or error that ended the run.
     """
 
@@ -318,7 +318,8 @@ def _print_short_study_report(run_outcome: StudyRunOutcome) -> None:
         *([f"overrides: {format_overrides(overrides)}"] if overrides else []),
         *summarise_study_as_text_lines(dataset),
         f"claims: {format_verdict_counts(run_outcome.verdicts) or '-'}",
-        f"in {format_duration(run_outcome.elapsed_seconds)}, wrote {' and '.join(map(str, run_outcome.output_files))}",
+        f"in {format_duration(run_outcome.elapsed_seconds)}, wrote "
+        f"{' and '.join(map(str, run_outcome.output_files))}",
     ):
         print_line(f"  {line}", soft_wrap=True)
     print_unexpected_verdicts(run_outcome.verdicts)

@@ -136,7 +136,7 @@ def copy_values(source, target, item_count):
 def interpolate_at_fractional_rows(columns, row_positions, result):
     """Interpolate columns at fractional row numbers.
 
-    The result is the same as the result of ``recording.interpolate_rows``.
+    The result is the same as the result of ``recording.interpolate_at_fractional_rows``.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ def build_compilation_error(numba_error: Exception) -> InvalidValue:
 
     Parameters
     ----------
-    error : Exception
+    numba_error : Exception
         Numba error. Its message begins with the innermost function.
 
     Returns

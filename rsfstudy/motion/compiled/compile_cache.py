@@ -1,8 +1,8 @@
 """Compilation of functions with Numba, and a cache of the results on disk.
 
-``compile_function`` and ``compile_cfunc_addresses`` are the main functions. These two functions
-copy a Python function together with all functions that it calls, replace the functions listed in
-``COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION``, and compile the copy.
+``compile_or_load_function`` and ``compile_cfuncs_and_get_addresses`` are the main functions. These
+two functions copy a Python function together with all functions that it calls, replace the
+functions listed in ``COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION``, and compile the copy.
 
 Each compiled function is stored in a folder whose name contains a digest of the source functions,
 the compiler and the processor. The folder is first written under a temporary name and is renamed

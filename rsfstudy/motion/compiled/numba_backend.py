@@ -54,7 +54,7 @@ class NumbaBackend:
     def pack_initial_motion_state(self, field_values: tuple[tuple[str, float], ...]) -> bytes:
         """Return the initial values of all motion state fields as bytes.
 
-        See ``python_backend.PythonBackend.initial_state_values``.
+        See ``python_backend.PythonBackend.pack_initial_motion_state``.
 
         Parameters
         ----------
@@ -78,8 +78,8 @@ class NumbaBackend:
         Parameters
         ----------
         initial_state : bytes
-            Initial values of the fields, from ``initial_state_values``.
-        call_arguments : tuple of float
+            Initial values of the fields, from ``pack_initial_motion_state``.
+        values_set_by_caller : tuple of float
             Values of the fields in ``array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER``.
 
         Returns
@@ -114,7 +114,7 @@ class NumbaBackend:
     def convert_arrays_for_motion_loop(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
         """Return the arrays unchanged.
 
-        See ``python_backend.PythonBackend.as_loop_arguments``.
+        See ``python_backend.PythonBackend.convert_arrays_for_motion_loop``.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class NumbaBackend:
     def convert_parameters_for_motion_loop(self, parameters: Sequence[float]) -> Any:
         """Convert the parameters of a scene to an array.
 
-        See ``python_backend.PythonBackend.as_loop_parameters``.
+        See ``python_backend.PythonBackend.convert_parameters_for_motion_loop``.
 
         Parameters
         ----------
@@ -165,7 +165,7 @@ class NumbaMotionState:
 
     Attributes
     ----------
-    memory : ndarray of MOTION_STATE_DTYPE, shape (1,)
+    motion_state_array : ndarray of MOTION_STATE_DTYPE, shape (1,)
         Argument ``motion_memory`` of the event loop.
     """
 

@@ -2,9 +2,9 @@
 
 The event loop calls the functions of this module, which call the methods of the stepper object. In
 the compiled loop, the functions of ``order_eight`` replace the functions of this module. For each
-regime, the loop first calls ``begin_regime``. In each step, the loop calls ``attempt_step`` once,
-or ``step_to_segment_end`` if a loading segment ends in the step. After each step, the loop may call
-``interpolate_unknowns`` and ``retake_step`` any number of times.
+regime, the loop first calls ``begin_integration_of_regime``. In each step, the loop calls
+``attempt_step`` once, or ``step_to_segment_end`` if a loading segment ends in the step. After each
+step, the loop may call ``interpolate_unknowns`` and ``retake_step`` any number of times.
 """
 
 from __future__ import annotations

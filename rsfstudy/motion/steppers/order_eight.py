@@ -42,7 +42,7 @@ _SAFETY_FACTOR, _MIN_FACTOR, _MAX_FACTOR, _ERROR_EXPONENT = 0.9, 0.2, 10.0, -1.0
 def begin_integration_of_regime(motion, workspace):
     """Evaluate the initial derivatives, and select the first step size.
 
-    See ``Stepper.begin_regime``.
+    See ``Stepper.begin_integration_of_regime``.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ def select_initial_step_length(workspace, integration_direction, tolerance):
     ----------
     workspace : Workspace
         Arrays of the regime, with the initial unknowns and their derivatives.
-    clock_direction : float
+    integration_direction : float
         Direction of the step, 1 or -1.
     tolerance : float
         Local error tolerance.

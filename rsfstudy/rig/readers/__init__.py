@@ -3,7 +3,7 @@
 Each module of this package reads one group of file formats. A reader consists of two functions: the
 first function checks if a source has the format of the reader, based on its first bytes or its
 type, and the second function converts the source to a ``Table``. To add a format, write the two
-functions, and add them to ``READERS``.
+functions, and add them to ``FORMAT_TESTS_AND_READERS``.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ def read_table_from_source(
 
     Parameters
     ----------
-    origin : str, Path, mapping, pandas.DataFrame, xarray.Dataset or Record
+    path_or_object : str, Path, mapping, pandas.DataFrame, xarray.Dataset or Record
         Path of a file, or object that contains the columns.
-    decimal : {".", ","}, default: "."
+    decimal_separator : {".", ","}, default: "."
         Decimal separator of text files.
-    sheet : str, default: ""
+    sheet_or_group_name : str, default: ""
         Sheet of a workbook, or group of a TDMS file. By default, the first sheet or group is read.
 
     Returns

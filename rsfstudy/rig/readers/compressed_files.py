@@ -77,7 +77,8 @@ def decompress_file(source: TableSource) -> TableSource:
         raise DataError(f"{source.path_or_object}: cannot be decompressed ({error})") from error
     if len(content) > limit:
         raise DataError(
-            f"{source.path_or_object}: contains more than {limit:,} bytes after decompression, which is "
+            f"{source.path_or_object}: contains more than {limit:,} bytes after "
+            "decompression, which is "
             "too much for a text file of this size. Decompress the file before you read it."
         )
     return replace(source, content=content)

@@ -37,14 +37,14 @@ def read_numeric_arrays(file_bytes: bytes) -> dict[str, np.ndarray]:
 
     Parameters
     ----------
-    data : bytes
+    file_bytes : bytes
         Bytes of a MATLAB file of version 5, 6 or 7.
 
     Returns
     -------
     dict of str to ndarray
-        Arrays by variable name. Fields of structures have names such as ``data.time``. Variables
-        that are not numeric are ignored.
+        Arrays by variable name. Fields of structures have names such as ``file_bytes.time``.
+        Variables that are not numeric are ignored.
 
     Raises
     ------

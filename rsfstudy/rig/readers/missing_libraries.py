@@ -17,9 +17,9 @@ def build_missing_library_error(
         File.
     format_name : str
         Name of the format with an indefinite article.
-    extra : str
+    extra_name : str
         Name of the optional dependency group (extra) of rsfstudy.
-    library : str
+    library_name : str
         Name of the library.
 
     Returns
@@ -28,6 +28,7 @@ def build_missing_library_error(
         Error with the command that installs the library.
     """
     return DataError(
-        f"{source.path_or_object}: is {format_name}, which requires the library {library_name}. Install the "
+        f"{source.path_or_object}: is {format_name}, which requires the library "
+        f"{library_name}. Install the "
         f"library: pip install 'rsfstudy[{extra_name}]'."
     )

@@ -1,6 +1,7 @@
 """Sources of data, and the tables that readers return.
 
-A ``Source`` is a file or an object that contains data. A reader converts a source to a ``Table``.
+A ``TableSource`` is a file or an object that contains data. A reader converts a source to a
+``SourceTable``.
 """
 
 from __future__ import annotations
@@ -28,14 +29,14 @@ class TableSource:
 
     Parameters
     ----------
-    origin : str, Path or object
+    path_or_object : str, Path or object
         Path of a file, or an object such as a mapping or a DataFrame.
-    decimal : {".", ","}, default: "."
+    decimal_separator : {".", ","}, default: "."
         Decimal separator of text files.
-    sheet : str, default: ""
+    sheet_or_group_name : str, default: ""
         Name of a sheet of a workbook, or name of a group of a TDMS file. If the string is empty,
         the first sheet or group is read.
-    content : bytes, optional
+    file_bytes : bytes, optional
         Bytes of the file. By default, the bytes are read from the path. Readers of compressed files
         pass the decompressed bytes.
     """
@@ -98,18 +99,18 @@ class SourceTable:
     ----------
     headings : sequence of str
         Headings of all columns, such as ``Time (s)`` or ``Time``.
-    location : str
+    heading_location : str
         Location of the headings for error messages.
-    load_values : callable
+    load_column : callable
         Function that converts the numbers of a column. The function takes the index of the column
         and the name of the quantity, and returns a ``Column``. The units of the column are an empty
         string unless the units follow from the type of the numbers.
     has_headings : bool, default: True
         False if the columns have no headings. In this case, the headings are the column numbers,
         counted from 1.
-    default_units : bool, default: False
+    uses_default_units : bool, default: False
         True if no column has units. The columns are then in the default units.
-    has_only_columns : bool, default: False
+    headings_are_column_names : bool, default: False
         True if an unknown heading is an error, because each heading must be the name of a usable
         column.
 
@@ -144,7 +145,7 @@ class SourceTable:
 
         Parameters
         ----------
-        heading : str
+        heading_or_number : str
             Complete heading, heading without its units, or number of the column, counted from 1.
 
         Returns
@@ -181,7 +182,7 @@ class SourceTable:
 
         Parameters
         ----------
-        index : int
+        column_index : int
             Index of the column.
 
         Returns
@@ -199,7 +200,7 @@ class SourceTable:
         ----------
         quantity_name : str
             Name of the quantity for error messages.
-        selection : ColumnSpec
+        column_selection : ColumnSpec
             Heading of the column with units, scale and offset. If the units in the file are missing
             or unknown, the units of the selection are used.
 
@@ -261,9 +262,9 @@ def build_table_of_arrays(
 
     Parameters
     ----------
-    names : sequence of str
+    headings : sequence of str
         Headings of the columns.
-    values : sequence of ndarray
+    column_arrays : sequence of ndarray
         Values of each column, as arrays of shape (rows,).
     location : str
         Location of the headings for error messages.

@@ -51,7 +51,7 @@ class _TextFileRows(NamedTuple):
     numbers : ndarray or None
         Numbers of all fields, as an array of shape (rows, columns), or None if a field is not a
         finite number.
-    fields : list of list of str
+    field_texts : list of list of str
         Fields of each row as strings. This list is used if ``numbers`` is None.
     line_numbers : ndarray of int
         Line number of each row.
@@ -275,7 +275,7 @@ class _FieldToNumberConverter(NamedTuple):
         Name of the quantity for error messages.
     column : Column
         Column that provides the location of a field for error messages.
-    decimal : {".", ","}
+    decimal_separator : {".", ","}
         Decimal separator.
     """
 
@@ -288,9 +288,9 @@ class _FieldToNumberConverter(NamedTuple):
 
         Parameters
         ----------
-        text : str
+        field_text : str
             Field. An empty field is converted to NaN.
-        row : int
+        row_index : int
             Index of the row.
 
         Returns

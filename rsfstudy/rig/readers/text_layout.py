@@ -44,9 +44,9 @@ class TextLayout(NamedTuple):
     headings : list of str
         Headings of the columns, with units. If the file has no header, the headings are the numbers
         of the columns, counted from 1. The list is empty if the file contains no text.
-    header_line : int
+    header_line_number : int
         Number of the line with the headings, counted from 1, or 0 if the file has no header.
-    body_line : int
+    first_line_number_after_header : int
         Number of the first line after the header, counted from 1.
     """
 
@@ -104,7 +104,7 @@ def detect_text_layout(lines: Sequence[str], decimal_separator: str) -> TextLayo
     ----------
     lines : sequence of str
         First lines of the file.
-    decimal : {".", ","}
+    decimal_separator : {".", ","}
         Decimal separator.
 
     Returns
@@ -115,7 +115,7 @@ def detect_text_layout(lines: Sequence[str], decimal_separator: str) -> TextLayo
     Raises
     ------
     InvalidValue
-        If numbers have decimal commas and ``decimal`` is a point.
+        If numbers have decimal commas and ``decimal_separator`` is a point.
     """
     lines = lines[:_MAX_LINES_FOR_LAYOUT_DETECTION]
     skipped, stated = _find_declared_delimiter(lines)

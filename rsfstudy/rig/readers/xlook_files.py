@@ -62,7 +62,8 @@ def read_xlook_file(source: TableSource) -> SourceTable:
     used = int.from_bytes(data[24:28], "big")
     if not 0 < used <= _MAX_COLUMNS:
         raise DataError(
-            f"{path}: has an unknown binary format. Formats that can be read: {_READABLE_FORMATS_FOR_MESSAGE}. "
+            f"{path}: has an unknown binary format. Formats that can be read: "
+            f"{_READABLE_FORMATS_FOR_MESSAGE}. "
             "Export the table as a CSV file. If the file were an xlook file, it would have "
             f"{used} columns."
         )

@@ -1,8 +1,8 @@
 """Inertia of the slider, defined by the period T of free oscillation.
 
 If inertia is weak, the motion follows the slow manifold of the inertial equations of motion
-(``build_slip_rate_functions``). During ruptures, the inertial equations of motion are integrated
-(``build_rupture_rate_function``).
+(``build_slow_manifold_slip_rate_functions``). During ruptures, the inertial equations of motion are
+integrated (``build_rupture_rate_function``).
 """
 
 from __future__ import annotations
@@ -95,7 +95,8 @@ def build_slow_manifold_slip_rate_functions(
     - ``growth`` returns :math:`dx_2/ds`, the sum of :math:`G` along the motion and a difference
       quotient of ``log_slip_rate_offset``.
 
-    If the scene has pore pressure, ``state_contribution`` replaces :math:`d\Psi/ds` in :math:`G`.
+    If the scene has pore pressure, ``state_contribution_to_friction`` replaces :math:`d\Psi/ds` in
+    :math:`G`.
     """
     strength, state_sum, evolutions = (
         friction_functions.strength,
@@ -310,7 +311,7 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Numeri
 
 
 def clamp_rate_per_inertial_time(rate: float) -> float:
-    """Limit the magnitude of a rate to ``MAX_RATE_PER_INERTIAL_TIME``.
+    """Limit the magnitude of a rate to ``MAX_RATE_OF_UNKNOWNS_PER_INERTIAL_TIME``.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def compute_radiated_stress(log_slip_rate: float, damping_coefficient: float) ->
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    damping : float
+    damping_coefficient : float
         Damping coefficient :math:`\eta V_*/\sigma_*`. For an elastic half-space with shear modulus
         :math:`G` and shear wave velocity :math:`c_s`, :math:`\eta = G/(2 c_s)`.
 

@@ -92,7 +92,7 @@ class FluidWithBoundaryPressure:
 
     Parameters
     ----------
-    loading : Loading
+    boundary_pressure_loading : Loading
         Loading with unknowns, the last of which is the pressure of the surroundings.
     fluid : Fluid
         Fluid with unknowns, the last of which is the pore pressure in the fault.

@@ -59,8 +59,8 @@ def compute_rates_with_porosity_length(
 ) -> FloatTuple:
     r"""Compute the rates if porosity has a separate slip distance.
 
-    Unlike ``porosity_and_pressure_rates``, the function uses the slip distance :math:`L_\varphi`
-    for the porosity. It reads :math:`D_c/L_\varphi` from ``p[FLUID + 2]``.
+    Unlike ``compute_porosity_and_pressure_rates``, the function uses the slip distance
+    :math:`L_\varphi` for the porosity. It reads :math:`D_c/L_\varphi` from ``p[FLUID + 2]``.
 
     Notes
     -----

@@ -41,7 +41,7 @@ def compute_drainage_pressure_rate(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
         Pore pressure :math:`P`.
-    fraction : float
+    slip_per_independent_variable : float
         Slip per unit of the independent variable, by which the result is multiplied.
     p : tuple of float
         Parameters of the scene. The function reads the drainage :math:`c^* D_c/V_*` from
@@ -50,7 +50,8 @@ def compute_drainage_pressure_rate(
     Returns
     -------
     tuple of float
-        Change in the pore pressure per unit slip in :math:`D_c`, multiplied by ``fraction``.
+        Change in the pore pressure per unit slip in :math:`D_c`, multiplied by
+        ``slip_per_independent_variable``.
     """
     time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LOG_SLOWNESS_UPPER_LIMIT))
     return (-p[FLUID + 1] * time * states[0],)

@@ -14,7 +14,8 @@ from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView
 
-#: Number of Halley iterations. Four Halley iterations of ``lambert_w`` reach rounding accuracy.
+#: Number of Halley iterations. Four Halley iterations of ``compute_lambert_w`` reach rounding
+#: accuracy.
 LAMBERT_W_HALLEY_ITERATION_COUNT = 4
 
 
@@ -94,7 +95,7 @@ def compute_healing_reduction_factor(log_slip_rate: float, log_cutoff_velocity: 
 
 
 def clamp_exponent(exponent: float) -> float:
-    """Limit an exponent to ``LARGEST_EVOLUTION_EXPONENT``.
+    """Limit an exponent to ``MAX_EXPONENT_IN_STATE_EVOLUTION``.
 
     Larger exponents occur only in trial steps of the integrator.
 
@@ -116,13 +117,13 @@ def compute_lambert_w(argument: float) -> float:
 
     Parameters
     ----------
-    value : float
+    argument : float
         Argument of the function.
 
     Returns
     -------
     float
-        Solution w of ``w * exp(w) = value``, computed by Halley's method.
+        Solution w of ``w * exp(w) = argument``, computed by Halley's method.
     """
     w = argument / (1.0 + argument)
     for _ in range(LAMBERT_W_HALLEY_ITERATION_COUNT):

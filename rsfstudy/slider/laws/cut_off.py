@@ -93,7 +93,7 @@ def compute_steady_state_over_b(
     -----
     The function uses two equivalent formulas, one for slip rates below :math:`V_*` and one for
     higher slip rates. Each formula avoids the cancellation of digits in its range of slip rates.
-    Exponents are limited to ``LARGEST_EVOLUTION_EXPONENT`` to avoid overflow.
+    Exponents are limited to ``MAX_EXPONENT_IN_STATE_EVOLUTION`` to avoid overflow.
     """
     if log_slip_rate < 0.0:
         exponent = min(-log_slip_rate, MAX_EXPONENT_IN_STATE_EVOLUTION)

@@ -25,8 +25,8 @@ from rsfstudy.slider.scene_view import SceneView
 class Noise(Part):
     r"""Base class of the noise that is added to the loading.
 
-    A subclass sets ``is_active`` to True and defines the methods ``iterate_segments`` and
-    ``changes_normal_stress``.
+    A subclass sets ``is_active`` to True and defines the methods ``iterate_segment_table_blocks``
+    and ``changes_normal_stress``.
 
     Examples
     --------
@@ -86,9 +86,9 @@ class Noise(Part):
 
         Parameters
         ----------
-        start, end : float
+        start_time, end_time : float
             Start and end of a loading segment in :math:`D_c/V_*`. The end may be infinite.
-        velocity : float
+        load_velocity : float
             Load point velocity :math:`V_0/V_*` during the loading segment.
 
         Returns

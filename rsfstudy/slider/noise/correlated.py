@@ -56,7 +56,7 @@ class CorrelatedNoise(WhiteNoise):
     def build_unit_noise_path(self, stream_number: int) -> noise_paths.UnitNoisePath:
         """Return the path of unit noise.
 
-        See ``WhiteNoise.path``.
+        See ``WhiteNoise.build_unit_noise_path``.
         """
         return noise_paths.UnitNoisePath(
             int(self.noise_seed), stream_number, self.noise_correlation_time

@@ -135,7 +135,7 @@ class WhiteNoise(Noise):
 
         Parameters
         ----------
-        stream : int
+        stream_number : int
             Number of the path: 0 for shear stress and 1 for normal stress.
 
         Returns
@@ -150,7 +150,7 @@ class WhiteNoise(Noise):
     ) -> Iterator[Any]:
         """Yield the segment table of the noise in blocks.
 
-        See ``Noise.iterate_segments``.
+        See ``Noise.iterate_segment_table_blocks``.
         """
         shear = self.build_unit_noise_path(0), self.stress_noise
         normal = (

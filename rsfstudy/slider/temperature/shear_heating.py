@@ -31,21 +31,22 @@ def compute_temperature_rate(
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    rise : float
+    temperature_rise : float
         Temperature rise :math:`\vartheta`.
-    friction : float
+    friction_coefficient : float
         Friction coefficient :math:`\mu`.
     normal_stress : float
         Effective normal stress :math:`s` in :math:`\sigma_*`.
-    fraction : float
+    slip_per_independent_variable : float
         Slip per unit of the independent variable, by which the result is multiplied.
-    parameters : tuple of float
+    heating_parameters : tuple of float
         Heating :math:`H`, cooling :math:`C`, and the product :math:`H \mu_*`.
 
     Returns
     -------
     float
-        Change in the temperature rise per unit slip in :math:`D_c`, multiplied by ``fraction``.
+        Change in the temperature rise per unit slip in :math:`D_c`, multiplied by
+        ``slip_per_independent_variable``.
 
     Notes
     -----
@@ -154,7 +155,7 @@ class ShearHeating(Temperature):
         return ("shear_heating", *("thermal_activation",) * any(self.activation))
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
-        r"""Return the parameters of ``temperature_rate``.
+        r"""Return the parameters of ``compute_temperature_rate``.
 
         See ``Part.parameter_values``.
         """

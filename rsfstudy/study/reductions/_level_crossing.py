@@ -1,7 +1,7 @@
 """Search for the position at which a sampled curve crosses a level.
 
-``find_crossing`` returns the position of a crossing with lower and upper bounds. The bounds account
-for the unknown shape of the curve between two samples.
+``find_unique_crossing`` returns the position of a crossing with lower and upper bounds. The bounds
+account for the unknown shape of the curve between two samples.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float
 
 
 def _build_result_without_crossing(crossing_status: CrossingSearchStatus) -> LevelCrossing:
-    """Return a ``Crossing`` that has a status but no position."""
+    """Return a ``LevelCrossing`` that has a status but no position."""
     return LevelCrossing(math.nan, math.nan, math.nan, crossing_status)
 
 

@@ -207,7 +207,7 @@ class LinearFit(Reduction):
 
         Parameters
         ----------
-        on : xarray.DataArray
+        coordinate_values : xarray.DataArray
             Values of the coordinate.
 
         Returns
@@ -339,7 +339,7 @@ class SemilogFit(LinearFit):
 
         Parameters
         ----------
-        on : xarray.DataArray
+        coordinate_values : xarray.DataArray
             Values of the coordinate.
 
         Returns

@@ -36,7 +36,7 @@ from rsfstudy.study.reductions.result_units import find_scale_varying_along_dime
 class _SampleStatistic(Reduction):
     """Base class of statistics over samples.
 
-    Subclasses define ``compute``, ``description`` and ``min_samples``.
+    Subclasses define ``compute_value_and_stderr``, ``description`` and ``min_samples``.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class _SampleStatistic(Reduction):
 
         Parameters
         ----------
-        of : xarray.DataArray
+        sample_values : xarray.DataArray
             Values of the samples.
 
         Returns
@@ -195,7 +195,7 @@ class Mean(_SampleStatistic):
 
         Parameters
         ----------
-        of : xarray.DataArray
+        sample_values : xarray.DataArray
             Values of the samples.
 
         Returns
@@ -276,7 +276,7 @@ class StandardDeviation(_SampleStatistic):
 
         Parameters
         ----------
-        of : xarray.DataArray
+        sample_values : xarray.DataArray
             Values of the samples.
 
         Returns
@@ -394,7 +394,7 @@ class Quantile(_SampleStatistic):
 
         Parameters
         ----------
-        of : xarray.DataArray
+        sample_values : xarray.DataArray
             Values of the samples.
 
         Returns
