@@ -28,7 +28,7 @@ from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, s
 
 FunctionParameters = ParamSpec("FunctionParameters")
 FunctionResult = TypeVar("FunctionResult")
-WrappedClass = TypeVar("GuardedClass", bound=type)
+WrappedClass = TypeVar("WrappedClass", bound=type)
 
 #: Exceptions that the error boundary does not convert.
 _EXCEPTIONS_PASSED_UNCHANGED = (RsfStudyError, Warning, bdb.BdbQuit)

@@ -167,7 +167,7 @@ class RecoveryError(Measure):
             if self.record_by == "the model"
             else _friction_by_scipy(model, true)
         )
-        model = replace(model, friction=made)
+        model = replace(model, recorded_friction=made)
         first = {
             n: v * INITIAL_FACTORS.get(n, 1.0) + INITIAL_OFFSETS.get(n, 0.0) if n in free else v
             for n, v in true.items()

@@ -157,7 +157,7 @@ class Track(NamedTuple):
             - scene.mu_star
         )
         events += [
-            event._replace(slip=slip, point=equations.evaluate_point((stress,)))
+            event._replace(slip=slip, point=equations.evaluate_motion_point((stress,)))
             for slip, stress in zip(self.samples, friction.tolist(), strict=True)
         ]
         return iter(sorted(events, key=lambda event: event.slip))

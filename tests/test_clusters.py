@@ -180,7 +180,7 @@ def test_a_scheduler_lost_in_mid_run(separate, held):
 
 def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
     other = {**provenance.collect_code_fingerprint(), "scipy": "0.1"}
-    monkeypatch.setattr(provenance, "code_fingerprint", lambda *_used: other)
+    monkeypatch.setattr(provenance, "collect_code_fingerprint", lambda *_used: other)
     with pytest.raises(RunError, match=r"a worker has scipy .*, but this run has 0\.1"):
         run(client=cluster)
 

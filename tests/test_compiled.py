@@ -158,7 +158,7 @@ def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
 
     study = reduced_study(name)
     scene = CellPlan(study).example_scenes[0]
-    monkeypatch.setattr(numba_backend, "compiled_function_addresses", asked)
+    monkeypatch.setattr(numba_backend, "get_compiled_function_addresses", asked)
     for clock in study.measure.needs_time:
         numba_backend.compile_equations_of_scene(scene, with_time=clock)
     prepared = set(wanted)
@@ -203,11 +203,12 @@ def test_other_processes_find_equations_again(tmp_path):
     asks = (
         "from rsfstudy import Accuracy, Integrator, Scene\n"
         "from rsfstudy.critical_steps.critical_path import CriticalPath\n"
-        "from rsfstudy.motion.compiled.numba_backend import compiled_function_addresses\n"
+        "from rsfstudy.motion.compiled.numba_backend import get_compiled_function_addresses\n"
         "from rsfstudy.motion.engines import compilation_log\n"
-        "from rsfstudy.slider.equations import equations_between_ruptures\n"
+        "from rsfstudy.slider.equations import build_equations_between_ruptures\n"
         "scene = Scene(normal_stress='constant')\n"
-        "compiled_function_addresses(equations_between_ruptures(scene, with_time=False))\n"
+        "equations = build_equations_between_ruptures(scene, with_time=False)\n"
+        "get_compiled_function_addresses(equations)\n"
         "CriticalPath.from_scene(scene, Integrator(Accuracy(engine='compiled')))\n"
         "print(compilation_log.compiled_program_count)\n"
     )
@@ -289,7 +290,7 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
         compile_cache._jit_compile_callee_once.cache_clear()
-        monkeypatch.setattr(numba_backend, "_COMPILED_ADDRESS_CACHE", {})
+        monkeypatch.setattr(numba_backend, "_COMPILED_ADDRESSES_BY_FUNCTIONS", {})
         equations = build_equations_between_ruptures(
             Scene(law=law, normal_stress="constant"), with_time=False
         )
@@ -310,7 +311,9 @@ def test_a_cache_of_other_code_is_never_used(monkeypatch):
     assert compile_cache.compute_code_digest(None, rate) == before
     cells = scene.friction_functions.strength.__closure__
     effect = next(
-        c.cell_contents for c in cells if c.cell_contents.__name__ == "linker_dieterich_effect"
+        c.cell_contents
+        for c in cells
+        if c.cell_contents.__name__ == "compute_linker_dieterich_state_decrease"
     )
     monkeypatch.setitem(effect.__globals__, "NORMAL_STRESS", 3)
     assert compile_cache.compute_code_digest(None, rate) != before

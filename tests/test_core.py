@@ -49,7 +49,7 @@ def test_invariant_of_the_slowness_law_at_critical_stiffness(load_velocity_ratio
 
     def until(event):
         held.append(invariant(event.point))
-        return event.clock > 300.0  # This path length covers about ten periods.
+        return event.independent_variable > 300.0  # This path length covers about ten periods.
 
     follow_until(scene, 1e-9, until)
     # H is of order 10, and local errors of 2e-11 accumulate to its drift.
@@ -112,17 +112,17 @@ def test_requested_tolerance_is_met_by_stick_slip_cycles(law, rtol):
 def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
     """The error of the slow manifold is of third order in the weight.
 
-    ``Accuracy.max_inertia_correction`` relies on this order. At the switch, ln V increases by
-    12.2 per slip of D_c.
+    ``Accuracy.max_log_rate_change_by_inertia`` relies on this order. At the switch, ln V increases
+    by 12.2 per slip of D_c.
     """
 
     @dataclasses.dataclass(frozen=True)
     class Switched(Accuracy):
         weight: float = 1e-3
 
-        max_inertia_weight = property(lambda self: self.weight)
-        max_inertia_correction = property(lambda _self: math.inf)
-        max_remaining_slip = property(lambda _self: 1e-9)
+        max_inertia_weight_on_slow_manifold = property(lambda self: self.weight)
+        max_log_rate_change_by_inertia = property(lambda _self: math.inf)
+        max_slip_in_return_to_slow_manifold = property(lambda _self: 1e-9)
         local_tolerance = property(lambda _self: 1e-11)
 
     exact, _drop = REFERENCES["slip"]

@@ -354,7 +354,7 @@ def test_workers_that_never_come(monkeypatch):
     from distributed import Client, LocalCluster
 
     for name, seconds in {
-        "_POLL_INTERVAL": 0.1,
+        "_SECONDS_BETWEEN_FUTURE_POLLS": 0.1,
         "WARN_AFTER_SECONDS_WITHOUT_WORKER": 0.2,
         "GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER": 0.4,
     }.items():

@@ -88,7 +88,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
 def test_what_reads_back_differently_is_not_put_in_place(tmp_path, monkeypatch):
     path = tmp_path / "trial.nc"
     monkeypatch.setattr(
-        dataset_files, "encoding_without_fill_values", lambda _d: {"v": {"dtype": "float32"}}
+        dataset_files, "build_encoding_without_fill_values", lambda _d: {"v": {"dtype": "float32"}}
     )
     with pytest.raises(DataError, match="stored data differ"):
         dataset_files.write_dataset(dataset(0.1), path)
@@ -277,10 +277,11 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
     """The modules are found by a process that has not loaded any study."""
     described = [study_loader.load_study(name).describe() for name in ("effects", "coverage")]
     asked = (
-        "import json, sys; from rsfstudy.storage import declarations as contents, "
-        "rebuild_from_file as restore\n"
+        "import json, sys; from rsfstudy.storage import stored_declarations as contents, "
+        "study_reconstruction as restore\n"
         "for plain in json.load(sys.stdin):\n"
-        "    study = restore.study_from_declaration(contents.parse_declaration(plain), {})\n"
+        "    declaration = contents.parse_study_declaration(plain)\n"
+        "    study = restore.build_study_from_declaration(declaration, {})\n"
         "    print(*(type(p).__name__ for p in (study.measure, study.reductions[0])))"
     )
     ran = subprocess.run(

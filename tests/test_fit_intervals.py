@@ -30,15 +30,17 @@ class Relaxation:
     averaging_time = 0.0
 
     @property
-    def friction_per_window(self) -> list[np.ndarray]:
-        return [self.friction]
+    def recorded_friction_per_window(self) -> list[np.ndarray]:
+        return [self.recorded_friction]
 
     def __init__(self, truth: ParameterValues, seed: int = 2) -> None:
-        self.time = self.displacement = np.linspace(0.0, 30.0, ROWS)
+        self.time_since_first_row_of_window = self.load_point_displacement = np.linspace(
+            0.0, 30.0, ROWS
+        )
         noise = np.random.default_rng(seed).standard_normal(ROWS)
-        self.friction = self.model_friction(truth) + SIZE * noise
+        self.recorded_friction = self.compute_model_friction(truth) + SIZE * noise
 
-    def model_friction(
+    def compute_model_friction(
         self,
         values: ParameterValues,
         *,
@@ -48,7 +50,7 @@ class Relaxation:
         """Return the friction of the model."""
         return np.asarray(
             values["mu_star"]
-            - values["b"] * -np.expm1(-self.displacement / values["slip_distance"])
+            - values["b"] * -np.expm1(-self.load_point_displacement / values["slip_distance"])
         )
 
     def compute_friction_trend(self, _values: ParameterValues) -> np.ndarray:
@@ -59,21 +61,21 @@ class Relaxation:
         """Return True for the friction level only."""
         return name == "mu_star"
 
-    def check_parameters(self, values: ParameterValues) -> None:
+    def check_parameters_define_valid_scenes(self, values: ParameterValues) -> None:
         """Accept all values."""
 
     def compute_loading_error_sensitivity(self, _values: ParameterValues) -> np.ndarray:
         """Return an empty sensitivity, because there is no load point."""
         return np.zeros((ROWS, 0))
 
-    def jacobian(
+    def compute_jacobian(
         self,
         values: ParameterValues,
         free: Sequence[str],
         difference_scheme: FiniteDifferenceScheme = QUICK_DIFFERENCE_SCHEME,
     ) -> np.ndarray:
         """Return the derivatives in closed form."""
-        over = self.displacement / values["slip_distance"]
+        over = self.load_point_displacement / values["slip_distance"]
         columns = {
             "b": np.expm1(-over),
             "slip_distance": values["b"] * over * np.exp(-over),
@@ -92,7 +94,7 @@ def fit(distance: float) -> tuple[Relaxation, FitProblem, FitSolution]:
 
 def squares(model: Relaxation, b: float, distance: float) -> float:
     """Return the minimum of the sum of squares over mu_star."""
-    left = model.friction + b * -np.expm1(-model.displacement / distance)
+    left = model.recorded_friction + b * -np.expm1(-model.load_point_displacement / distance)
     return ROWS * float(np.var(left))
 
 

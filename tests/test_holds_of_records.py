@@ -166,7 +166,9 @@ def test_fit_counts_the_error_of_a_measured_stiffness(monkeypatch: pytest.Monkey
     record = synthetic.synthetic_record()
     options = {**synthetic.FIT_OPTIONS, "laws": ["slowness"], "noise": "ar1"}
     spread = 0.03
-    monkeypatch.setattr(fit_record, "_measure_stiffness", lambda _records: (3e-3, 0.0, spread))
+    monkeypatch.setattr(
+        fit_record, "_measure_stiffness_in_records", lambda _records: (3e-3, 0.0, spread)
+    )
     measured = rsfstudy.fit(record, **options | {"stiffness": "from record"}).squeeze()
     exact, softer, stiffer = (
         rsfstudy.fit(record, **options | {"stiffness": 3e-3 * factor}).squeeze()

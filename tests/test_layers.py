@@ -66,9 +66,9 @@ HOMES = {
     "sqlite3": {"storage/cell_journal"},
     "zarr": set(),  # xarray writes and reads Zarr stores.
     "msgspec": {
-        "storage/declarations",
-        "storage/plain_data",
-        "storage/rebuild_from_file",
+        "storage/stored_declarations",
+        "storage/plain_data_conversion",
+        "storage/study_reconstruction",
         "referee/problem_files",
     },
 }
@@ -175,8 +175,9 @@ def test_the_guide_to_the_physics_names_modules_that_are_there():
 def test_studies_load_nothing_that_draws():
     """Loading the studies does not import Matplotlib."""
     asked = (
-        "import sys; from rsfstudy.study import study_loader as catalogue, study_index as names\n"
-        "for name in names.study_names(): catalogue.load_study(name)\n"
+        "import sys; from rsfstudy.study import study_loader as catalogue\n"
+        "from rsfstudy.study import named_study_index as names\n"
+        "for name in names.list_study_names(): catalogue.load_study(name)\n"
         "print(*{'matplotlib'} & set(sys.modules))"
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)

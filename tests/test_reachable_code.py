@@ -40,7 +40,9 @@ def edit(monkeypatch, path):
         ModuleImportGraph(changed).compute_digests()
         != ModuleImportGraph({path: SOURCES[path]}).compute_digests()
     )
-    monkeypatch.setattr(provenance, "_modules_at_import", ModuleImportGraph({**SOURCES, **changed}))
+    monkeypatch.setattr(
+        provenance, "_import_graph_at_import_time", ModuleImportGraph({**SOURCES, **changed})
+    )
 
 
 def study_of_critical_steps(*laws):
@@ -81,7 +83,7 @@ def test_a_longer_axis_adds_the_modules_of_its_laws(tmp_path, monkeypatch):
     stored = json.loads(found.attrs["provenance"])["fingerprint"]["physics"]
     assert {"slider.laws.slip", "slider.laws.slowness"} <= set(stored)
     resume(study_of_critical_steps("slip"), tmp_path, monkeypatch)  # It keeps both modules.
-    monkeypatch.setattr(provenance, "_modules_at_import", ModuleImportGraph(SOURCES))
+    monkeypatch.setattr(provenance, "_import_graph_at_import_time", ModuleImportGraph(SOURCES))
     with pytest.raises(DataError, match=r"physics \(slider.laws.slowness\)"):
         rsfstudy.run(both, output=tmp_path, **OPTIONS)
     with closing(sqlite3.connect(tmp_path / "steps.cells.sqlite")) as db:
@@ -226,7 +228,7 @@ class Warm(DrainedFluid):
     name = "warm"
     warmth: float = number(2.0, "$w$", "1", "warmth", omit_if_default=True)
 
-fluid.BUILT_IN_PARTS["warm"] = Warm
+fluid.BUILT_IN_FLUID_CLASS_BY_NAME["warm"] = Warm
 old = slider_parameters.SliderParameters
 @dataclass(frozen=True, kw_only=True)
 class SliderParameters(old):
@@ -238,16 +240,17 @@ import sys
 sys.path.insert(0, {tests!r})
 import test_reachable_code as tests
 from rsfstudy import Scene
+rebuild = tests.stored_declarations.build_scene_from_stored_fields
 for key, cell in tests.KEYS.items():
     assert tests.compute_cell_key(*cell).hex() == key
     assert not {{"warmth", "lean"}} & cell[0].stored_fields().keys()
-    assert tests.declarations.build_scene_from_stored(cell[0].stored_fields()) == cell[0]
+    assert rebuild(cell[0].stored_fields()) == cell[0]
 warm = Scene(fluid="warm")
 assert (warm.warmth, warm.lean) == (2.0, 0.5) and Scene().warmth is None
 assert warm.as_dict()["warmth"] == 2.0 and "warmth" not in warm.stored_fields()
 assert Scene(fluid="warm", warmth=3.0).with_(fluid="drained") == Scene()
 for scene in (warm, Scene(fluid="warm", warmth=3.0), Scene(lean=0.7)):
-    assert tests.declarations.build_scene_from_stored(scene.stored_fields()) == scene
+    assert rebuild(scene.stored_fields()) == scene
     keys.add(tests.compute_cell_key(scene, tests.LimitCycle()))
 print(len(keys))
 """

@@ -166,7 +166,9 @@ def test_units_that_contradict_the_file_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("library", ["openpyxl", "python_calamine"])
 def test_workbooks(library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        spreadsheets, "_ENGINES", {library: spreadsheets._PANDAS_ENGINE_BY_LIBRARY[library]}
+        spreadsheets,
+        "_PANDAS_ENGINE_BY_LIBRARY",
+        {library: spreadsheets._PANDAS_ENGINE_BY_LIBRARY[library]},
     )
     path = tmp_path / "run.xlsx"
     frame = pd.DataFrame(dict(zip(HEADINGS, DATA.values(), strict=True)))
@@ -316,8 +318,10 @@ def test_a_new_format_is_one_pair_of_functions(
             HEADINGS, str(source.path_or_object), lambda n, _name: Column(values[n], "")
         )
 
-    pair = (lambda source: source.signature.startswith(b"raw\0"), read_raw)
-    monkeypatch.setattr(readers, "READERS", [pair, *readers.FORMAT_TESTS_AND_READERS])
+    pair = (lambda source: source.first_bytes_of_file.startswith(b"raw\0"), read_raw)
+    monkeypatch.setattr(
+        readers, "FORMAT_TESTS_AND_READERS", [pair, *readers.FORMAT_TESTS_AND_READERS]
+    )
     (tmp_path / "run.raw").write_bytes(b"raw\0" + np.array([*DATA.values()]).tobytes())
     check(tmp_path / "run.raw")
 

@@ -306,7 +306,7 @@ def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
 
     The first run is not affected.
     """
-    monkeypatch.setattr(cell_journal, "_LOCK_TIMEOUT", 0.1)
+    monkeypatch.setattr(cell_journal, "_JOURNAL_LOCK_TIMEOUT_SECONDS", 0.1)
     study, computed, refused = (
         faulty_study(cells=CELLS),
         cell_computation.compute_cell,
@@ -332,7 +332,7 @@ def test_other_versions_are_not_mixed(name, tmp_path, monkeypatch):
 
     run(output=tmp_path)
     other = {**provenance.collect_code_fingerprint(), name: "other"}
-    monkeypatch.setattr(provenance, "code_fingerprint", lambda *_used: other)
+    monkeypatch.setattr(provenance, "collect_code_fingerprint", lambda *_used: other)
     with pytest.raises(DataError, match=f"{name}: .* in the journal, other in this run"):
         run(output=tmp_path)
 

@@ -199,10 +199,10 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
     """
     started, lost = [], [True]
 
-    def mapper(task, batches):
+    def mapper(cell_settings, batches):
         if lost:
             raise RunError("the connection to the Dask scheduler is lost")
-        yield from worker_pool.compute_cell_batches_serially(task, batches)
+        yield from worker_pool.compute_cell_batches_serially(cell_settings, batches)
 
     def start(_processes, file):
         started.append(file)

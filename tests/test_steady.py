@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from motion_helpers import cot_phi
 
 from rsfstudy import Scene
-from rsfstudy.responses.perturbation_growth import compute_jacobian, max_growth_rate
+from rsfstudy.responses.perturbation_growth import compute_jacobian, compute_max_growth_rate
 from rsfstudy.slider import closed_forms, laws, stability, steady_state
 from rsfstudy.slider.equations import build_equations_against_displacement
 from rsfstudy.slider.friction import compute_effective_normal_stress
@@ -152,7 +152,7 @@ def test_growth_close_to_critical_stiffness(off, effects):
     scene = Scene(stiffness_ratio=1.0 + off, **effects)
     expected = -0.25 * (scene.b_over_a - 1.0) * off
     # Central differences have an error of 6e-10 for rates of order one.
-    grows = max_growth_rate(
+    grows = compute_max_growth_rate(
         compute_jacobian(build_equations_against_displacement(scene), (0.0, 0.0))
     )
     assert grows == pytest.approx(expected, rel=1e-5, abs=1e-9)

@@ -44,13 +44,13 @@ from rsfstudy.status import Status
 
 SLOW = Scene(stiffness_ratio=1.5, load_velocity_ratio=1.5)
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
+DILATANT = Scene(fluid="dilatant", load_velocity_ratio=3.0)
 #: Systems of one to five equations, each with a state inside its domain.
 SYSTEMS = [
     (build_equations_at_imposed_slip_rate(Scene(), 2.0), (0.05,)),
     (build_equations_between_ruptures(SLOW, with_time=False), (0.01, 0.004)),
     (build_equations_in_rupture(Scene(**CYCLE), with_time=True), (0.2, 17.0, 0.19, 0.0)),
-    (build_equations_between_ruptures(Scene(fluid="dilatant", load_velocity_ratio=3.0), with_time=True),
-     (0.01, 0.004, 0.001, -0.01, 0.0)),
+    (build_equations_between_ruptures(DILATANT, with_time=True), (0.01, 0.004, 0.001, -0.01, 0.0)),
 ]  # fmt: skip
 
 

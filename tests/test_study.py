@@ -245,11 +245,11 @@ def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     study = MIXED if name == "mixed" else study_loader.load_study(name)
     plan = CellPlan(study)
     numbers = np.unique(np.linspace(0, study.size - 1, 72).astype(int))
-    task = cell_computation.SharedCellSettings(study.base, study.measure, study.accuracy)
-    monkeypatch.setattr(cell_computation, "_load_cell_task", lambda _sent: task)
-    monkeypatch.setattr(cell_computation, "_FINISHED_CELLS_HANDOVER_INTERVAL", np.inf)
-    monkeypatch.setattr(task.output_packer, "pack_cell", lambda *finished: finished)
-    monkeypatch.setattr(cell_computation, "compute_cell", lambda _task, cell: (cell, 0.0))
+    cell_settings = cell_computation.SharedCellSettings(study.base, study.measure, study.accuracy)
+    monkeypatch.setattr(cell_computation, "_load_cell_settings", lambda _sent: cell_settings)
+    monkeypatch.setattr(cell_computation, "_SECONDS_BETWEEN_JOURNAL_TRANSFERS", np.inf)
+    monkeypatch.setattr(cell_settings.output_packer, "pack_journal_row", lambda *finished: finished)
+    monkeypatch.setattr(cell_computation, "compute_cell", lambda _cell_settings, cell: (cell, 0.0))
     found = pickle.loads(
         cell_computation.compute_packed_cell_batch(
             b"", cell_computation.pack_cell_batch(plan, numbers)

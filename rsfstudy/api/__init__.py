@@ -25,13 +25,13 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "api.fit_record": ("DEFAULT_FREE_PARAMETERS", "STIFFNESS_FROM_RECORD", "fit"),
-            "api.html_report": ("write_report",),
-            "api.result_paths": ("find_results",),
+            "api.fit_record": ("DEFAULT_FREE_PARAMETERS", "STIFFNESS_OPTION_FROM_RECORD", "fit"),
+            "api.html_report": ("write_html_report",),
+            "api.result_paths": ("find_results_file",),
             "api.simulation": ("BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME", "simulate"),
             "api.study_runs": (
                 "apply_overrides_to_study",
-                "prepare_run_with_progress",
+                "make_run_function_with_progress",
                 "recompute_cell",
             ),
         },

@@ -142,8 +142,8 @@ def fit(
         window ends at the next step, or at the end of the record.
     windows : int, default: 1
         Number of windows for each fit. The windows include between 50 and 100 % of the displacement
-        after the step. For each parameter, ``<name>_fitted_windows`` is the range of the parameter
-        over the windows. A range that is larger than the standard error indicates that the record
+        after the step. For each parameter, ``<name>_windows`` is the range of the parameter over
+        the windows. A range that is larger than the standard error indicates that the record
         contains a signal that the model does not describe, such as a trend.
     noise : str, default: "ar"
         Noise model: "ar" for an autoregressive process with an automatic order, "ar1", "ar2" and so

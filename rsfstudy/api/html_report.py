@@ -188,9 +188,8 @@ def _build_html_page(directory: Path, file_sections: list[_ReportSectionOfFile])
     made = build_provenance_attributes("rsfstudy report")
     when, by = made["history"].split()[0], made["source"].partition(",")[0]
     sections = (
-        f'<section id="{one.html_anchor}">\n<h2>{_escape_for_html(one.results_path.stem)}: {_escape_for_html(one.title)}</h2>\n'
-        + "\n".join(one.html_parts)
-        + "\n</section>"
+        f'<section id="{one.html_anchor}">\n<h2>{_escape_for_html(one.results_path.stem)}: '
+        f"{_escape_for_html(one.title)}</h2>\n" + "\n".join(one.html_parts) + "\n</section>"
         for one in file_sections
     )
     page = Template(resources.files(__package__).joinpath("report.html").read_text("utf-8"))
@@ -341,11 +340,10 @@ def _format_table_or_sentence_as_html(table_or_sentence: SummaryTableOrSentence)
         }
         rows_.append([HtmlMarkup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
     caption = _format_html_paragraph(table_or_sentence.caption) if table_or_sentence.caption else ""
-    return (
-        f'{caption}<div class="wide">{HtmlMarkup.format_table(list(table_or_sentence.rows[0]), rows_)}</div>'
-        if rows_
-        else ""
-    )
+    if not rows_:
+        return ""
+    table = HtmlMarkup.format_table(list(table_or_sentence.rows[0]), rows_)
+    return f'{caption}<div class="wide">{table}</div>'
 
 
 def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -> str:

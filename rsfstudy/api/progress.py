@@ -46,8 +46,8 @@ def show_progress(
     Yields
     ------
     callable
-        Function ``update(done, total, estimate_remaining_seconds)`` that displays the number of
-        completed cells and the remaining time.
+        Function ``update(done, total, remaining_seconds)`` that displays the number of completed
+        cells and the remaining time.
     """
     console = Console(stderr=True)
     if callable(is_shown_or_callback):

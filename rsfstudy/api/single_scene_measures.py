@@ -71,8 +71,8 @@ def critical_step(
     -------
     xarray.Dataset
         Dataset with scalar variables. The critical value is ``critical_velocity_ratio`` (in V_*),
-        ``critical_displacement`` (in D_c) or ``compute_critical_normal_stress_step`` (in sigma_*).
-        The dataset also contains the numerical error ``<name>_error`` and two steps that verify the
+        ``critical_displacement`` (in D_c) or ``critical_normal_stress_step`` (in sigma_*). The
+        dataset also contains the numerical error ``<name>_error`` and two steps that verify the
         critical value. The slider settles after the step ``<name>_stable`` and becomes unstable
         after the step ``<name>_unstable``. ``rhs_evaluations`` is the number of right-hand side
         evaluations. The attributes ``status`` and ``message`` describe the outcome. If there is no

@@ -626,7 +626,7 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
 
     Returns
     -------
-    Comparison
+    ResultsComparison
         Differences between the datasets. The attribute ``agreement_table`` is a table with one row
         per variable, which includes the number of values that differ by more than the sum of both
         error estimates. The attribute ``agrees`` is True if the datasets have common cells, all

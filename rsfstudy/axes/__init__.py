@@ -22,7 +22,7 @@ else:
         {
             "axes.axis": (
                 "Axis",
-                "AxisRow",
+                "AxisPointFieldValues",
             ),
         },
     )

@@ -40,7 +40,7 @@ class CommandResult(ABC):
         """
 
 
-AnyCommandResult = TypeVar("Result", bound=CommandResult)
+AnyCommandResult = TypeVar("AnyCommandResult", bound=CommandResult)
 
 
 def print_result_as_text_or_json(

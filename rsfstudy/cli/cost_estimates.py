@@ -73,7 +73,7 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> StudyCos
 
     Returns
     -------
-    CostEstimate
+    StudyCostEstimate
         Estimated work and computing time.
     """
     work, guess = cell_plan.estimate_evaluations_and_time()
@@ -111,10 +111,13 @@ def collect_accuracy_and_cost_fields(cell_plan: CellPlan, output_directory: Path
         Relative tolerance, expected work, computing time and number of measured cells.
     """
     cost = estimate_study_cost(cell_plan, output_directory)
-    fields = ("rhs_evaluations", "seconds", "measured_cells")
     return {
         "rtol": cell_plan.study.accuracy.rtol,
-        "cost": {name: getattr(cost, name) for name in fields},
+        "cost": {
+            "rhs_evaluations": cost.rhs_evaluations,
+            "seconds": cost.seconds,
+            "measured_cells": cost.measured_cell_count,
+        },
     }
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from rsfstudy import Study
+from rsfstudy import Axis, Study
 from rsfstudy.cli import cost_estimates
 from rsfstudy.cli.command_results import EXIT_STATUS_OK, CommandResult
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
@@ -124,10 +124,7 @@ def print_study_declaration(declaration: StudyDeclaration) -> None:
     )
     about = {
         **{
-            f"axis {axis.dimension} ({format_count_with_noun(len(axis), 'value')})": _format_axis_points(
-                axis.point_names
-            )
-            for axis in study.axes
+            _format_axis_heading(axis): _format_axis_points(axis.point_names) for axis in study.axes
         },
         **describe_scene_and_rig_fields(
             "fixed fields",
@@ -143,6 +140,11 @@ def print_study_declaration(declaration: StudyDeclaration) -> None:
         "cost": "; ".join(filter(None, costs)),
     }
     print_tables_and_sentences([{name: text or "-" for name, text in about.items()}])
+
+
+def _format_axis_heading(axis: Axis) -> str:
+    """Format the dimension of an axis and its number of values."""
+    return f"axis {axis.dimension} ({format_count_with_noun(len(axis), 'value')})"
 
 
 def _format_axis_points(axis_points: Sequence[str]) -> str:

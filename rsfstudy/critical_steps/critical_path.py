@@ -149,7 +149,7 @@ class CriticalPath(NamedTuple):
         p = list(self.scene_parameter_values)
         p[LOAD_VELOCITY] = load_velocity
         p[LOG_LOAD_VELOCITY] = math.log(abs(load_velocity)) if load_velocity else -math.inf
-        return self._replace(parameters=tuple(p))
+        return self._replace(scene_parameter_values=tuple(p))
 
     @property
     def tangency_point_at_instability_norm(self) -> tuple[float, float] | None:
@@ -451,7 +451,7 @@ def compile_if_engine_is_compiled(
         The compiled function, or ``function`` itself if the engine is not the compiled engine.
     """
     return (
-        Engine.import_compiled_engine().compile_scalar_function(function, *arguments)
+        Engine.import_compiled_engine().compile_function_of_floats(function, *arguments)
         if engine == Engine.COMPILED
         else function
     )

@@ -61,14 +61,14 @@ def find_critical_size_by_critical_path(
 
     Parameters
     ----------
-    step_family : StepFamily
+    step_family : LoadingStepFamily
         Family of steps in which to search for the boundary.
     integrator : Integrator
         Integrator with the requested accuracy.
 
     Returns
     -------
-    StepBoundary or None
+    CriticalStepSizeEstimate or None
         The boundary, or None if there is no critical path or if smaller steps may be unstable.
     """
     boundary = _find_critical_size_with_error(
@@ -101,14 +101,14 @@ def find_critical_size_by_limit_cycle(
 
     Parameters
     ----------
-    step_family : StepFamily
+    step_family : LoadingStepFamily
         Family of steps in which to search for the boundary.
     integrator : Integrator
         Integrator with the requested accuracy.
 
     Returns
     -------
-    StepBoundary or None
+    CriticalStepSizeEstimate or None
         The boundary, or None if there is no such limit cycle.
     """
     small, large = (

@@ -1,8 +1,8 @@
 """Families of steps, and the shooting method that finds critical steps.
 
 The base class ``LoadingStepFamily`` describes all steps of one type and direction, ordered by size.
-The class ``LoadingStepFamilySolvedByShooting`` adds the shooting method. The module ``step_types``
-contains the concrete classes.
+The class ``LoadingStepFamilySolvedByShooting`` adds the shooting method. The module
+``loading_step_types`` contains the concrete classes.
 """
 
 from __future__ import annotations

@@ -132,7 +132,8 @@ def compute_log_rate_excess_over_norm(scene: Scene, integrator: Integrator) -> f
     also grows up to the norm. The same rules apply to scenes with inertia, because inertia acts
     only during ruptures. If the scene has several states, the integration ends only if the slip
     rate reaches the instability norm, if the motion settles to steady sliding, or if a cycle
-    repeats. The module ``held_load_point`` handles held load points.
+    repeats. The module ``motion_with_held_load_point`` handles held
+    load points.
     """
     if scene.log_load_velocity == -math.inf:
         return compute_peak_log_rate_excess_over_norm(scene, integrator)

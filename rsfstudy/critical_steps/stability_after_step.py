@@ -207,7 +207,7 @@ def compute_steady_sliding_with_margin(scene: Scene) -> SteadySlidingWithStabili
 
     Returns
     -------
-    SteadySlidingWithMargin
+    SteadySlidingWithStabilityMargin
         Steady sliding.
 
     Raises

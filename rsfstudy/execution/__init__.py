@@ -29,7 +29,7 @@ else:
             "execution.clusters": ("connect_to_cluster",),
             "execution.cell_plan": ("CellPlan",),
             "execution.study_run_preparation": ("prepare_study_run",),
-            "execution.provenance": ("provenance_attributes", "run_fingerprint"),
+            "execution.provenance": ("build_provenance_attributes", "collect_run_fingerprint"),
             "execution.study_run": ("OutputOptions", "ProgressCallback"),
             "execution.worker_pool": ("WorkerPool",),
         },

@@ -52,7 +52,7 @@ _DASK_CPU_TIME_OVER_CELL_TIME_LIMIT = 0.25
 #: Maximum length of a message in the journal, in characters.
 _MAX_STORED_MESSAGE_LENGTH = 2000
 
-StoredCellRows = list[CellJournalRow]
+CellJournalRows = list[CellJournalRow]
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class SharedCellSettings:
         Versions and code digests that affect the results. The versions and code digests of each
         worker must be equal to these values.
     origin_process_id : str, optional
-        Identifier of the process that created the task.
+        Identifier of the process that created the settings.
     """
 
     base_scene: Scene
@@ -96,14 +96,14 @@ class SharedCellSettings:
         return CellOutputPacker(self.measure)
 
 
-#: Type of the functions that compute cells. Such a function takes a task and an iterator of
-#: batches, and yields lists of finished cells in any order.
-CellBatchMapper = Callable[[SharedCellSettings, "CellBatchIterator"], Generator[StoredCellRows]]
+#: Type of the functions that compute cells. Such a function takes the settings of the cells
+#: and an iterator of batches, and yields lists of finished cells in any order.
+CellBatchMapper = Callable[[SharedCellSettings, "CellBatchIterator"], Generator[CellJournalRows]]
 
 
 def compute_cell_batches_serially(
     cell_settings: SharedCellSettings, batches: CellBatchIterator
-) -> Generator[StoredCellRows]:
+) -> Generator[CellJournalRows]:
     """Compute cells one after the other in this process.
 
     Finished cells are yielded in groups, because writing a single cell to the journal may take
@@ -112,17 +112,17 @@ def compute_cell_batches_serially(
 
     Parameters
     ----------
-    cell_settings : CellTask
+    cell_settings : SharedCellSettings
         Scene, measure and accuracy of the cells.
     batches : CellBatchIterator
         Batches of cells to compute.
 
     Yields
     ------
-    list of StoredCellRow
+    list of CellJournalRow
         Finished cells.
     """
-    finished: StoredCellRows = []
+    finished: CellJournalRows = []
     handed_over, since = 0, time.monotonic()
     for key, changes in (
         cell for some in batches for cell in batches.plan.iterate_keys_and_field_changes(some)
@@ -143,21 +143,21 @@ def compute_cell_batches_serially(
 
 
 def serialize_cell_settings(cell_settings: SharedCellSettings) -> bytes:
-    """Serialise a task for the workers.
+    """Serialise the settings of the cells for the workers.
 
-    The serialised task includes the code that workers cannot import. The serialised task also
-    includes the code of the modules of named studies. If a worker imported these modules instead,
+    The result includes the code that workers cannot import. The result also includes the code of
+    the modules of named studies. If a worker imported these modules instead,
     it would load all modules that are needed to declare and reduce studies.
 
     Parameters
     ----------
-    cell_settings : CellTask
-        Task to serialise.
+    cell_settings : SharedCellSettings
+        Settings to serialise.
 
     Returns
     -------
     bytes
-        Serialised task.
+        Serialised settings.
 
     Raises
     ------
@@ -184,39 +184,43 @@ def serialize_cell_settings(cell_settings: SharedCellSettings) -> bytes:
 
 @functools.lru_cache(maxsize=4)
 def _load_cell_settings(serialized_settings: bytes) -> SharedCellSettings:
-    """Load a task in a worker process.
+    """Load the settings of the cells in a worker process.
 
     Raises
     ------
     RunError
-        If the task cannot be loaded, or if the worker has different versions or different code.
+        If the settings cannot be loaded, or if the worker has different versions or different code.
     """
     try:
-        task: SharedCellSettings = cloudpickle.loads(serialized_settings)
+        cell_settings: SharedCellSettings = cloudpickle.loads(serialized_settings)
     except Exception as error:
         raise RunError(
             f"a worker process cannot load the measure or a scene part ({type(error).__name__}: "
             f"{error}). Copy the required files to the workers, or put them in the directory of "
             "the study file"
         ) from error
-    used = *task.measure.code_classes, *task.user_parts, *task.user_stepper_classes
-    ours = provenance.collect_code_fingerprint(task.accuracy.engine, used)
-    for name, wanted in task.code_fingerprint.items():
+    used = (
+        *cell_settings.measure.code_classes,
+        *cell_settings.user_parts,
+        *cell_settings.user_stepper_classes,
+    )
+    ours = provenance.collect_code_fingerprint(cell_settings.accuracy.engine, used)
+    for name, wanted in cell_settings.code_fingerprint.items():
         if ours.get(name) != wanted:
             raise RunError(
                 f"a worker has {name} {ours.get(name)}, but this run has {wanted}, so results of "
                 "different code would be mixed. Install the same versions and files on the "
                 "workers, and restart them"
             )
-    return task
+    return cell_settings
 
 
 def pack_cell_batch(cell_plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
     """Pack a batch of cells into as few bytes as possible.
 
     The batches are compressed because the Dask scheduler keeps all batches in memory. A batch
-    contains only the names of user-defined parts, because the serialised task contains the code of
-    these parts.
+    contains only the names of user-defined parts, because the serialised settings contain the
+    code of these parts.
 
     Parameters
     ----------
@@ -260,27 +264,27 @@ def compute_packed_cell_batch(serialized_settings: bytes, packed_batch: bytes) -
     Raises
     ------
     RunError
-        If the worker cannot load the task, or if the worker has different versions or different
-        code.
+        If the worker cannot load the settings, or if the worker has different versions or
+        different code.
     """
-    task = _load_cell_settings(serialized_settings)
-    finished: StoredCellRows = []
+    cell_settings = _load_cell_settings(serialized_settings)
+    finished: CellJournalRows = []
+    output_packer = cell_settings.output_packer
     began = time.monotonic()
-    ours = (
-        task.origin_process_id == _UNIQUE_PROCESS_ID
-    )  # A worker may be a thread of the process of the user.
+    # A worker may be a thread of the process of the user.
+    ours = cell_settings.origin_process_id == _UNIQUE_PROCESS_ID
     if not ours:
         Engine.compilation_log.create_compilation_context = _cpu_time_limits.suspend_temporarily
     with (
         contextlib.nullcontext()
         if ours
-        else _cpu_time_limits.enforce_in_this_thread(task.cell_cpu_time_limit)
+        else _cpu_time_limits.enforce_in_this_thread(cell_settings.cell_cpu_time_limit)
     ):
-        SceneFields.register_user_parts(task.user_parts)
-        Engine.register_user_steppers(task.user_stepper_classes)
+        SceneFields.register_user_parts(cell_settings.user_parts)
+        Engine.register_user_steppers(cell_settings.user_stepper_classes)
         for key, *changes in pickle.loads(zlib.decompress(packed_batch)):
-            cell = CellFieldChanges(*changes).build_cell(task.base_scene)
-            finished.append(task.output_packer.pack_journal_row(key, *compute_cell(task, cell)))
+            cell = CellFieldChanges(*changes).build_cell(cell_settings.base_scene)
+            finished.append(output_packer.pack_journal_row(key, *compute_cell(cell_settings, cell)))
             if time.monotonic() - began > _SECONDS_BETWEEN_JOURNAL_TRANSFERS:
                 break
     return pickle.dumps(finished)
@@ -298,7 +302,7 @@ def compute_cell(
 
     Parameters
     ----------
-    cell_settings : CellTask
+    cell_settings : SharedCellSettings
         Scene, measure and accuracy of the cells.
     cell : Cell
         Cell to compute.

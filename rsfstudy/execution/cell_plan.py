@@ -141,7 +141,7 @@ class CellPlan:
 
         Returns
         -------
-        iterator of tuple of (bytes, CellChanges)
+        iterator of tuple of (bytes, CellFieldChanges)
             Key of each cell, and the field values of the cell that differ from the base scene or
             from the measure of the study.
         """

@@ -18,7 +18,7 @@ import xarray as xr
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.execution import provenance
-from rsfstudy.execution.cell_computation import CellBatchMapper, SharedCellSettings, StoredCellRows
+from rsfstudy.execution.cell_computation import CellBatchMapper, CellJournalRows, SharedCellSettings
 from rsfstudy.execution.cell_plan import CellBatchIterator, CellPlan, order_cells_by_golden_section
 from rsfstudy.execution.remaining_time_estimate import RemainingTimeEstimator
 from rsfstudy.reductions import apply_reductions
@@ -100,7 +100,7 @@ class StudyRun:
         Study to run.
     options : OutputOptions
         Output files, and handling of failed cells.
-    cell_settings : CellTask
+    cell_settings : SharedCellSettings
         Scene, measure and accuracy of the cells.
     workers : int, default: 1
         Number of cells that are computed at the same time. The sizes of the batches depend on this
@@ -267,7 +267,7 @@ class StudyRun:
                         "the cause, or continue with --keep-going (keep_going=True)"
                     )
 
-    def _warn_of_lost_cells(self, finished_cells: StoredCellRows) -> None:
+    def _warn_of_lost_cells(self, finished_cells: CellJournalRows) -> None:
         """Warn about cells that were lost because their worker process ended."""
         for key, status, message, *_ in finished_cells:
             if status in _STATUSES_OF_LOST_CELLS:

@@ -38,7 +38,7 @@ def prepare_study_run(
     InvalidValue
         If the study is invalid, or if the code of the study cannot be sent to the workers.
     """
-    task = SharedCellSettings(
+    cell_settings = SharedCellSettings(
         study.base,
         study.measure,
         study.accuracy,
@@ -50,7 +50,6 @@ def prepare_study_run(
         ),
     )
     if worker_pool.make_cell_batch_mapper() is not compute_cell_batches_serially:
-        serialize_cell_settings(
-            task
-        )  # Serialisation errors are raised here, before any cell is computed.
-    return StudyRun(study, output_options, task, worker_pool.count_concurrent_cells())
+        # Serialisation errors are raised here, before any cell is computed.
+        serialize_cell_settings(cell_settings)
+    return StudyRun(study, output_options, cell_settings, worker_pool.count_concurrent_cells())

@@ -27,8 +27,8 @@ from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.execution.cell_computation import (
     WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT,
     CellBatchMapper,
+    CellJournalRows,
     SharedCellSettings,
-    StoredCellRows,
     compute_cell_batches_serially,
     compute_packed_cell_batch,
     pack_cell_batch,
@@ -164,7 +164,7 @@ class WorkerPool(contextlib.ExitStack):
 
     def _compute_batches_on_processes(
         self, log_path: Path | None, cell_settings: SharedCellSettings, batches: CellBatchIterator
-    ) -> Generator[StoredCellRows]:
+    ) -> Generator[CellJournalRows]:
         """Compute batches on local worker processes, and start them if necessary."""
         from rsfstudy.execution import worker_log
 
@@ -203,9 +203,9 @@ def make_dask_batch_mapper(
     """
 
     def map_cells(
-        task: SharedCellSettings, batches: CellBatchIterator
-    ) -> Generator[StoredCellRows]:
-        sent, plan = serialize_cell_settings(task), batches.plan
+        cell_settings: SharedCellSettings, batches: CellBatchIterator
+    ) -> Generator[CellJournalRows]:
+        sent, plan = serialize_cell_settings(cell_settings), batches.plan
         # These cells are the remainders of batches that a worker returned early.
         left: list[np.ndarray] = []
         running: dict[Any, np.ndarray] = {}
@@ -218,7 +218,7 @@ def make_dask_batch_mapper(
             running[future] = cells
             return future
 
-        def run_isolated(cell: np.ndarray) -> StoredCellRows:
+        def run_isolated(cell: np.ndarray) -> CellJournalRows:
             """Compute a cell that may have killed its worker, while no other cell runs.
 
             If the cell kills its worker repeatedly, the cell is recorded as lost.
@@ -233,14 +233,16 @@ def make_dask_batch_mapper(
                 del running[future]
                 if (finished := _load_finished_cells_of_batch(future)) is not None:
                     return finished
-                if (seconds := time.monotonic() - began) > task.cell_cpu_time_limit:
+                if (seconds := time.monotonic() - began) > cell_settings.cell_cpu_time_limit:
                     return [
-                        task.output_packer.pack_journal_row(
-                            key, _make_outcome_of_exceeded_time_limit(task), seconds
+                        cell_settings.output_packer.pack_journal_row(
+                            key, _make_outcome_of_exceeded_time_limit(cell_settings), seconds
                         )
                     ]
             return [
-                task.output_packer.pack_journal_row(key, _make_outcome_of_lost_worker(), math.nan)
+                cell_settings.output_packer.pack_journal_row(
+                    key, _make_outcome_of_lost_worker(), math.nan
+                )
             ]
 
         try:
@@ -368,7 +370,7 @@ def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any])
             raise RunError(_SCHEDULER_LOST_MESSAGE) from error
 
 
-def _load_finished_cells_of_batch(future: Any) -> StoredCellRows | None:
+def _load_finished_cells_of_batch(future: Any) -> CellJournalRows | None:
     """Return the finished cells of a batch, or None if its worker died.
 
     Raises
@@ -379,7 +381,7 @@ def _load_finished_cells_of_batch(future: Any) -> StoredCellRows | None:
     from distributed import KilledWorker
 
     try:
-        finished: StoredCellRows = pickle.loads(future.result())
+        finished: CellJournalRows = pickle.loads(future.result())
     except KilledWorker:
         return None
     except RunError:

@@ -4,12 +4,14 @@ A view consists of widgets and plots. A view calls public functions of rsfstudy 
 computation, so this package contains no physics. A view never writes files. The browser saves the
 files that you download. The modules are:
 
-- ``entry_points`` contains the functions ``explore`` and ``serve``. - ``views`` chooses the view of
-a scene, a dataset or a file. - ``view`` contains the base class ``ExplorerView``, which adds code,
-downloads and messages to a view. - ``messages`` formats the messages of errors. - ``jobs`` runs
-computations in a thread, with a progress bar and a cancel button. - ``server`` serves the views to
-the browser of this computer only. - ``scene_view``, ``results_view`` and ``record_view`` contain
-one view each.
+- ``entry_points`` contains the functions ``explore`` and ``serve``.
+- ``view_creation`` chooses the view of a scene, a dataset or a file.
+- ``base_view`` contains the base class ``ExplorerView``, which adds code, downloads and messages to
+  a view.
+- ``error_messages`` formats the messages of errors.
+- ``background_jobs`` runs computations in a thread, with a progress bar and a cancel button.
+- ``server`` serves the views to the browser of this computer only.
+- ``scene_view``, ``results_view`` and ``record_view`` contain one view each.
 
 The explorer needs Panel, which ``pip install 'rsfstudy[explore]'`` installs.
 """

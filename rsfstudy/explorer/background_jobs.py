@@ -94,7 +94,7 @@ class BackgroundJobs:
     ----------
     indicator : panel.Row
         Progress bar and cancel button. They become visible if a computation takes longer than
-        `DELAY` seconds.
+        `PROGRESS_BAR_DELAY_SECONDS` seconds.
     """
 
     def __init__(self, warn: Callable[[Sequence[str]], None]) -> None:

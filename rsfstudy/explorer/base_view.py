@@ -54,7 +54,7 @@ class ExplorerView(ABC):
 
     Attributes
     ----------
-    jobs : Jobs
+    jobs : BackgroundJobs
         Runner of computations that take longer than a fraction of a second.
     """
 
@@ -150,7 +150,7 @@ class ExplorerView(ABC):
         Returns
         -------
         matplotlib.figure.Figure
-            Figure drawn by the functions of ``rsfstudy.list_plot_panes``.
+            Figure drawn by the functions of ``rsfstudy.plots``.
         """
 
     @abstractmethod
@@ -198,7 +198,7 @@ class ExplorerView(ABC):
 
         Returns
         -------
-        View
+        ExplorerView
             View of the source.
         """
         view = cls(source)

@@ -177,12 +177,12 @@ def extract_curves_of_panel(dataset: xr.Dataset, panel: PlotSelection) -> list[C
     ----------
     dataset : xarray.Dataset
         Results of a study.
-    panel : Selection
+    panel : PlotSelection
         Selection with the kind ``"lines"``.
 
     Returns
     -------
-    list of Curve
+    list of CurveData
         One curve per selected point of the colour dimension.
     """
     along, second = find_dimension_along_x(dataset, panel.variable, panel.x), panel.second
@@ -253,12 +253,12 @@ def extract_map_of_panel(dataset: xr.Dataset, panel: PlotSelection) -> MapData:
     ----------
     dataset : xarray.Dataset
         Results of a study.
-    panel : Selection
+    panel : PlotSelection
         Selection with the kind ``"map"``.
 
     Returns
     -------
-    Map
+    MapData
         Values and statuses, with increasing coordinates.
     """
     dims = (panel.second, panel.x)
@@ -278,7 +278,7 @@ def sample_map_at_pixels(
 
     Parameters
     ----------
-    map_data : Map
+    map_data : MapData
         Map to sample.
     x_range, y_range : tuple of (float, float)
         Limits of the image. If the points of an axis are spaced logarithmically, the pixels are
@@ -335,7 +335,7 @@ def find_cells_to_mark(status_codes: np.ndarray, cell_numbers: np.ndarray) -> St
 
     Returns
     -------
-    Marks
+    StatusMarks
         Cells in row-major order.
     """
     rows, columns = np.nonzero(status_codes != int(Status.OK))

@@ -84,7 +84,7 @@ def serve(
     """
     _check_panel_is_installed()
     server = importlib.import_module("rsfstudy.explorer.server").ExplorerServer(source, state, port)
-    server.run(open_browser=open_browser, announce=announce_address)
+    server.run(open_browser=open_browser, announce_address=announce_address)
 
 
 def _check_panel_is_installed() -> None:

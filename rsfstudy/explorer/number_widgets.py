@@ -59,7 +59,7 @@ class SliderRange(NamedTuple):
         """
         high = _RATIO_OF_PLAIN_FIELD * typical_value
         if "whole number" in rule:
-            return cls(0.0, max(20.0, 2.0 * typical_value), is_whole=True)
+            return cls(0.0, max(20.0, 2.0 * typical_value), has_only_whole_numbers=True)
         if "between 0 and 1" in rule:
             return cls(0.0, 1.0)
         if rule == POSITIVE or (rule == NON_NEGATIVE and scale_name in ("V_*", "D_c/V_*")):
@@ -122,8 +122,8 @@ class NumberWidget:
         """Create the widgets."""
         self._limits, self._changed, self._is_moved_by_code = limits, changed, False
         self._slider = pn.widgets.FloatSlider(
-            label=label, start=0.0, end=1.0, step=1.0 / _SLIDER_STEP_COUNT, show_value=False, width=145,
-            value=limits.convert_value_to_position(value or 0.0), tooltips=False,
+            label=label, start=0.0, end=1.0, step=1.0 / _SLIDER_STEP_COUNT, show_value=False,
+            width=145, value=limits.convert_value_to_position(value or 0.0), tooltips=False,
         )  # fmt: skip
         step = 10.0 ** math.floor(math.log10(max(abs(limits.low), abs(limits.high)))) / 100.0
         self._box = pn.widgets.FloatInput(

@@ -143,7 +143,7 @@ def complete_selection(
 
     Returns
     -------
-    Selection
+    PlotSelection
         Complete selection.
 
     Raises

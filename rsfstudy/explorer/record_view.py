@@ -299,9 +299,9 @@ class RecordView(ExplorerView):
             self._build_fit_arguments(),
         )
         if path or reading:
+            arguments = format_values_as_python_code(reading)
             lines.append(
-                "record = "
-                f"{format_python_call('rsfstudy.read_record', format_values_as_python_code(reading), source)}"
+                f"record = {format_python_call('rsfstudy.read_record', arguments, source)}"
             )
         lines.append(
             "fit = "

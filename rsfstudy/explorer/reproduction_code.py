@@ -26,7 +26,7 @@ def draw_figure_of_selection(dataset: xr.Dataset, selection: PlotSelection) -> F
     ----------
     dataset : xarray.Dataset
         Results of a study, in the units of the plot.
-    selection : Selection
+    selection : PlotSelection
         Selection to draw.
 
     Returns
@@ -64,7 +64,7 @@ def write_selection_as_python_code(
     ----------
     dataset : xarray.Dataset
         Results of a study, in the units of the plot.
-    selection : Selection
+    selection : PlotSelection
         Selection to reproduce.
     results_path : str
         Path of the results. If the string is empty, the results were not read from a file.
@@ -118,7 +118,7 @@ def write_selection_as_shell_commands(
 
     Parameters
     ----------
-    selection : Selection
+    selection : PlotSelection
         Selection to reproduce.
     results_path : str
         Path of the results. If the string is empty, the results were not read from a file.

@@ -89,7 +89,7 @@ class ResultPlot(ABC):
     ----------
     dataset : xarray.Dataset
         Results of a study, in the units of the plot.
-    panel : Selection
+    panel : PlotSelection
         Selection without a facet.
     on_cell : callable
         Function that receives the number of the cell that the user clicks.
@@ -151,7 +151,7 @@ class ResultPlot(ABC):
         ----------
         dataset : xarray.Dataset
             Results of a study, in the units of the plot.
-        panel : Selection
+        panel : PlotSelection
             Selection that differs only in its points.
         """
         title = describe_selected_points(dataset, panel.points)

@@ -76,7 +76,7 @@ class ResultsView(ExplorerView):
 
     Attributes
     ----------
-    selection : Selection
+    selection : PlotSelection
         Variable, axes and points that the plot shows.
     """
 
@@ -358,7 +358,10 @@ class ResultsView(ExplorerView):
             self._start_cell_recomputation(number)
 
     def write_python_code(self) -> str:
-        """Return code that prints the numbers of the plot. See ``ExplorerView.write_python_code``."""
+        """Return code that prints the numbers of the plot.
+
+        See ``ExplorerView.write_python_code``.
+        """
         return write_selection_as_python_code(
             self.shown, self.selection, self.file, self.cell, self._find_chosen_cell_coordinates()
         )
@@ -392,7 +395,10 @@ class ResultsView(ExplorerView):
         return table
 
     def build_dataset_for_download(self) -> xr.Dataset:
-        """Return the results that the plot shows. See ``ExplorerView.build_dataset_for_download``."""
+        """Return the results that the plot shows.
+
+        See ``ExplorerView.build_dataset_for_download``.
+        """
         names = list_shown_variable_names(self.shown, self.selection)
         return self.shown[names].isel(dict(self.selection.points))
 

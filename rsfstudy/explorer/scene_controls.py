@@ -121,7 +121,7 @@ class SceneControls:
 
         Parameters
         ----------
-        slot : Slot
+        slot : PartSlot
             Slot of a scene.
 
         Returns

@@ -75,7 +75,7 @@ class ComputedMotion(NamedTuple):
 
         Returns
         -------
-        Result
+        ComputedMotion
             Motion and summary.
         """
         rig = settings.build_rig()

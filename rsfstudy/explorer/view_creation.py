@@ -42,7 +42,7 @@ def create_view(source: Any = None, state: str | None = None) -> ExplorerView:
 
     Returns
     -------
-    View
+    ExplorerView
         View whose method ``panel`` returns the Panel object.
     """
     kind, loaded = _find_view_kind_and_object(source)

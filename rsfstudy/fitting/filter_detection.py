@@ -60,7 +60,7 @@ def detect_unspecified_filter(
     time : ndarray, shape (rows,)
         Times in s.
     noise_model_name : str
-        Noise model (see ``rsfstudy.fitting.noise_model_name.fit_noise_model``).
+        Noise model (see ``rsfstudy.fitting.noise.fit_noise_model``).
 
     Returns
     -------

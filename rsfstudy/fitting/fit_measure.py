@@ -493,7 +493,7 @@ class Fit(Measure):
         scenes = [w.with_machine_stiffness(scene, per_um) for w in windows]
         of_each = zip(windows, scenes, strict=True)
         parts = [w.create_model(one, self.free, self.loading, smooth) for w, one in of_each]
-        parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
+        parts = [replace(part, friction_filter=Filter.parse(self.filter)) for part in parts]
         if self.noise == WHITE_NOISE_NAME:  # The usual formula ignores the noise of the load point.
             parts = [replace(part, loadings_with_shifted_steps=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess

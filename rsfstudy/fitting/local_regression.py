@@ -86,7 +86,7 @@ def fit_linear_model(
 
     Returns
     -------
-    LinearFit
+    GeneralisedLeastSquaresFit
         Coefficients, their covariance matrix and the noise.
     """
     coefficients = np.linalg.lstsq(jacobian, values)[0]
@@ -159,7 +159,7 @@ def choose_longest_polynomial_window(
         Coordinates and values of the samples.
     degree : int
         Degree of the polynomial.
-    noise_reference_fit : LinearFit
+    noise_reference_fit : GeneralisedLeastSquaresFit
         Fit of other rows of the record, which have the same noise.
 
     Returns

@@ -213,7 +213,7 @@ def find_locked_portions(
 
     Yields
     ------
-    Portion
+    LockedPortion
         Portions in order of time.
     """
     noise_sd = math.sqrt(noise_variance(time, displacement))
@@ -309,7 +309,7 @@ def fit_stiffness(portion: LockedPortion) -> tuple[float, float]:
 
     Parameters
     ----------
-    portion : Portion
+    portion : LockedPortion
         Portion of the record to which the stiffness is fitted.
 
     Returns

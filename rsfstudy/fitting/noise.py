@@ -116,7 +116,7 @@ class NoiseModel:
         Noise levels relative to the first noise level.
     non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers. By default, no rows are outliers.
-    correlation_from_averaging : AveragedNoiseCorrelation, optional
+    correlation_from_averaging : NoiseCorrelationFromAveraging, optional
         Correlation due to averaging by a data logger. This correlation is removed before the
         autoregressive correlation.
     """
@@ -419,7 +419,7 @@ def estimate_noise_model_by_moments(
         noise_model_name, find_sampling_runs(time), residuals, min_noise_sd
     )
     return replace(
-        found, non_outlier_mask=non_outlier_mask, averaging_correlation=overlap
+        found, non_outlier_mask=non_outlier_mask, correlation_from_averaging=overlap
     ), min_noise_sd / first
 
 

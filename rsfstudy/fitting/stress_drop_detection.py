@@ -84,7 +84,7 @@ class Detection(NamedTuple):
 
     Parameters
     ----------
-    candidates : list of DropCandidate
+    candidates : list of StressDropCandidate
         Detected drops in order of time.
     noise_sd : float
         Standard deviation of the noise.

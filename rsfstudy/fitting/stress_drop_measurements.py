@@ -176,7 +176,7 @@ def find_sample_indices_of_drop(
     ----------
     times : ndarray, shape (samples,)
         Times of the samples.
-    detected_and_fitted_drop : FittedDropCandidate
+    detected_and_fitted_drop : DetectedAndFittedStressDrop
         Fitted drop.
     adjacent_drop_times : (float, float)
         End of the previous drop, and start of the next drop.
@@ -212,7 +212,7 @@ def compute_drop_quantities(
         Times and shear stresses of the samples.
     displacement : ndarray, shape (samples,), or None
         Displacements of the samples. If the value is None, slip and slip rate are not computed.
-    detected_and_fitted_drop : FittedDropCandidate
+    detected_and_fitted_drop : DetectedAndFittedStressDrop
         Fitted drop.
     sample_indices : DropSampleIndices
         Indices of the samples in the drop.

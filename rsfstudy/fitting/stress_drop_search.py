@@ -1,7 +1,8 @@
 """Detection and fitting of shear stress drops in a record.
 
-The module ``drop_detection`` detects the drops, and the module ``drop_fit`` fits straight lines to
-each drop. The function ``find_stress_drops`` calls both modules.
+The module ``stress_drop_detection`` detects the drops, and the module
+``three_line_stress_drop_fit`` fits straight lines to each drop. The function ``find_stress_drops``
+calls both modules.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class DetectedAndFittedStressDrop(NamedTuple):
     ----------
     fitted_drop : FittedStressDrop
         Result of the fit.
-    detected_drop : DropCandidate
+    detected_drop : StressDropCandidate
         Detected drop.
     """
 
@@ -72,7 +73,7 @@ def find_stress_drops(
 
     Returns
     -------
-    drops : list of FittedDropCandidate
+    drops : list of DetectedAndFittedStressDrop
         Drops in order of time.
     detection : Detection
         Result of the detection.

@@ -74,7 +74,7 @@ def find_normal_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> lis
 
     Returns
     -------
-    list of StressStep
+    list of NormalStressStep
         Steps in order of time. Changes in normal stress of less than 2 % are ignored.
     """
     every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
@@ -172,7 +172,7 @@ def merge_normal_stress_and_velocity_steps(
     ----------
     velocity_steps : sequence of LoadingStep
         Steps of load point velocity.
-    stress_steps : sequence of StressStep
+    stress_steps : sequence of NormalStressStep
         Steps of normal stress.
     default_velocity : float
         Load point velocity in um/s that is used if there are no steps of load point velocity.
@@ -216,7 +216,7 @@ def set_normal_stresses_of_steps(
     ----------
     steps : sequence of LoadingStep
         Steps in order of time.
-    stress_steps : sequence of StressStep
+    stress_steps : sequence of NormalStressStep
         Detected steps of normal stress. If the normal stress does not change during a step, the
         normal stresses before and after the step are equal.
     time, stress : ndarray, shape (rows,)

@@ -146,7 +146,7 @@ def fit_stress_drop(
     ----------
     time, stress : ndarray, shape (samples,)
         Times and shear stresses of the samples, in any units.
-    candidate : DropCandidate
+    candidate : StressDropCandidate
         Detected drop.
     adjacent_drop_times : (float, float)
         End of the previous drop, and start of the next drop.

@@ -92,7 +92,7 @@ class LimitCycleSearch:
 
     Attributes
     ----------
-    cycles : list of Cycle
+    cycles : list of StickSlipCycle
         All computed cycles. If ``follow_cycles_until_converged`` has returned True, the last cycle
         is the limit cycle.
     """
@@ -313,7 +313,7 @@ class StickSlipSequence:
 
     Parameters
     ----------
-    cycles : list of Cycle
+    cycles : list of StickSlipCycle
         Cycles of the motion. In the results of ``LimitCycle``, a cycle is called an event.
     approached_periodic_orbit : PeriodicOrbit or None
         Periodic orbit that the motion approaches, or None if no orbit was found.
@@ -421,7 +421,7 @@ def find_recurrence_period(
     ----------
     scene : Scene
         Scene of the motion.
-    cycles : sequence of Cycle
+    cycles : sequence of StickSlipCycle
         Successive cycles.
     compared_state_indices : sequence of int, optional
         Indices of the states to compare. By default, all states are compared, except the states in

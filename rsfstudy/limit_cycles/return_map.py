@@ -72,7 +72,7 @@ class PeriodicOrbit:
 
     Parameters
     ----------
-    cycles : tuple of Cycle
+    cycles : tuple of StickSlipCycle
         Successive cycles.
     return_map_derivatives_per_cycle : tuple of ndarray
         Derivatives of each cycle, of shape (1 + states + results, 1 + states). Rows correspond to
@@ -148,7 +148,7 @@ class PeriodicOrbit:
         return replace(
             self,
             cycles=self.cycles[at:] + self.cycles[:at],
-            cycle_derivatives=self.return_map_derivatives_per_cycle[at:]
+            return_map_derivatives_per_cycle=self.return_map_derivatives_per_cycle[at:]
             + self.return_map_derivatives_per_cycle[:at],
             start_section_correction=multiply_return_map_derivatives(
                 self.return_map_derivatives_per_cycle[:at]
@@ -178,7 +178,7 @@ def extract_section_and_outputs_at_cycle_end(cycle: StickSlipCycle) -> np.ndarra
 
     Parameters
     ----------
-    cycle : Cycle
+    cycle : StickSlipCycle
         Cycle of a motion.
 
     Returns
@@ -304,7 +304,7 @@ class ReturnMap:
 
         Returns
         -------
-        list of Cycle
+        list of StickSlipCycle
             Successive cycles. The list is shorter than ``cycle_count`` if the motion settles, stays
             close to unstable steady sliding, or cannot continue. Unstable steady sliding is a fixed
             point of the map, but not a cycle.
@@ -495,7 +495,9 @@ class ReturnMap:
         if len(slopes) < cycle_count:
             return None
         return replace(
-            found, cycles=found.cycles[:cycle_count], cycle_derivatives=slopes[:cycle_count]
+            found,
+            cycles=found.cycles[:cycle_count],
+            return_map_derivatives_per_cycle=slopes[:cycle_count],
         )
 
     def refine_periodic_orbit(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:

@@ -148,7 +148,7 @@ def iterate_stick_slip_cycles(
 
     Yields
     ------
-    Cycle or None
+    StickSlipCycle or None
         The next cycle. If the last item is None, the motion has settled to steady sliding.
     """
     begin, begun, fallen, seen = None, 0.0, start_point is None, list[Event]()
@@ -210,7 +210,7 @@ def extract_recorded_rows_of_cycles(
     ----------
     scene : Scene
         Scene of the motion.
-    cycles : sequence of Cycle
+    cycles : sequence of StickSlipCycle
         Successive cycles.
     recording : Recording or None
         Recording of the cycles. If None, the record contains only the beginning and the end of the

@@ -32,12 +32,12 @@ else:
             "measure_base._declaration_checks": ("OutputValue",),
             "measure_base._loading_checks": (
                 "check_loading_changes_stress_only_in_steps",
-                "refuse_noise",
+                "check_loading_has_no_noise",
             ),
             "measure_base._recording_measure": ("RecordingMeasure", "create_outputs_along_phase"),
             "measure_base.elasticities": ("Elasticities",),
             "measure_base.measure": ("Measure", "Outcome"),
-            "measure_base.steady_sliding_stability": ("steady_sliding_is_linearly_stable",),
+            "measure_base.steady_sliding_stability": ("is_steady_sliding_linearly_stable",),
         },
     )
 

@@ -68,10 +68,10 @@ else:
                 "minimum",
                 "rise",
             ),
-            "motion.former_arguments": ("accept_accuracy_and_meter",),
+            "motion.former_arguments": ("accept_former_accuracy_and_meter",),
             "motion.integrator": ("Integrator",),
             # Former export. ``Scene`` has a method that replaces this function.
-            "slider.equations": ("slow_manifold_point",),
+            "slider.equations": ("compute_slow_manifold_point as slow_manifold_point",),
             "motion.work_meter": (
                 "MotionStopped",
                 "WorkMeter",

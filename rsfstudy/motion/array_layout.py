@@ -28,9 +28,9 @@ pending_start                             MotionDriver (START_CODE), advance_mot
 regime_start_time                         integrate_one_regime (at the end of a regime),
                                           start_next_segment (set to 0)
 clock                                     stepper (set to 0 at the start of a regime),
-                                          advance_to_step_end
+                                          move_step_begin_to_step_end
 end, step_length                          stepper (each step),
-                                          step_integration.truncate_step_at_clock (end only)
+                                          step_integration.truncate_step_at (end only)
 next_step_length                          stepper, advance_motion and start_next_segment (set to 0),
                                           step_integration.halve_step_until_dense_output_is_accurate
 time_per_step                             stepper (each step), integrate_one_regime (set to 0)
@@ -44,7 +44,7 @@ jacobians                                 steppers.scipy
 target_time                               truncate_step_at_end_of_regime_or_segment,
                                           step_samples.record_requested_samples
 event_rows, recorded_rows                 step_events.append_event_row,
-                                          step_samples.append_recorded_row,
+                                          step_samples.append_sample_row,
                                           advance_motion (set to 0 in each call)
 samples_taken                             step_samples.record_requested_samples
 must_report                               integrate_one_regime (at a kink), advance_motion (cleared)

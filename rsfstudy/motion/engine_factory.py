@@ -50,7 +50,7 @@ def create_stepper(
     ----------
     engine_name : str
         Name of the engine.
-    equations_by_regime : iterable of Equations
+    equations_by_regime : iterable of EquationsOfMotion
         Equations of each regime. The compiled engine ignores this argument.
     method_by_regime : mapping of str to str
         Name of the SciPy solver for each regime.
@@ -121,7 +121,7 @@ def call_array_function_with_engine(
         Arguments of the function. In plain Python, the function receives memory views.
     """
     if engine_name == COMPILED:
-        import_compiled_engine().compile_array_function(
+        import_compiled_engine().compile_function_of_arrays(
             function, *(array.ndim for array in arrays)
         )(*arrays)
     else:

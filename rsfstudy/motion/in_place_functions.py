@@ -49,7 +49,7 @@ def build_in_place_functions(equations: EquationsOfMotion) -> InPlaceFunctions:
 
     Parameters
     ----------
-    equations : Equations
+    equations : EquationsOfMotion
         System of equations.
 
     Returns
@@ -187,11 +187,11 @@ def build_fill_force_balance_function(
     Returns
     -------
     callable
-        Function ``fill_balance(y, rates, p, result)``. The function fills in ln(V/V_*) and friction
-        for the spring stress and the states in ``y``.
+        Function ``fill_force_balance(y, rates, p, result)``. The function fills in ln(V/V_*) and
+        friction for the spring stress and the states in ``y``.
     """
 
-    def fill_balance(y, rates, p, result):  # type: ignore[no-untyped-def]
+    def fill_force_balance(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[0] = result[1] = math.nan
         log_slip_rate, friction, _shift = force_balance_function(
             y[0], unpack_states(y), unpack_parameters(p)
@@ -199,7 +199,7 @@ def build_fill_force_balance_function(
         result[0] = log_slip_rate
         result[1] = friction
 
-    return fill_balance
+    return fill_force_balance
 
 
 @cache

@@ -272,7 +272,7 @@ class Integrator:
 
         Parameters
         ----------
-        equations : Equations
+        equations : EquationsOfMotion
             System of equations.
         initial_unknowns : tuple of float
             Initial values of the unknowns.

@@ -70,9 +70,9 @@ class MotionDriver:
 
     Parameters
     ----------
-    slow_equations : Equations
+    slow_equations : EquationsOfMotion
         Equations of the slow manifold, which describe the motion between ruptures.
-    fast_equations : Equations, optional
+    fast_equations : EquationsOfMotion, optional
         Inertial equations of motion in ruptures. Omit these equations if the scene has no inertia.
     engine : str
         Name of the engine.
@@ -158,7 +158,7 @@ class MotionDriver:
             If True, the independent variable decreases.
         parameters : tuple of float, optional
             Parameters that replace the parameters of the equations.
-        switch_thresholds : SwitchThresholds, optional
+        switch_thresholds : RegimeSwitchThresholds, optional
             Thresholds for changes between the regimes. Motions without inertia do not require
             thresholds.
         evaluation_budget : float, default: inf

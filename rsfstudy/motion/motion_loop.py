@@ -6,18 +6,18 @@ functions are called in the following order::
     advance_motion                     integrate until the motion ends or a table is full
         enter_initial_regime           choose the regime of the initial point
         integrate_one_regime           integrate one regime within one loading segment
-            begin_regime               let the stepper evaluate the first derivatives
+            begin_integration_of_regime  let the stepper evaluate the first derivatives
             take_step                  attempt steps until the error of one step is small enough
             halve_step_until_dense_output_is_accurate  improve dense output of recorded steps
             is_step_end_valid          check for the end of the motion, e.g. vanishing normal stress
             truncate_step_at_end_of_regime_or_segment
             record_regime_start        first step only
             append_start_events        first step only
-            record_step                append the samples of the step to ``recording_table``
+            record_step_samples        append the samples of the step to ``recording_table``
             append_events_in_step      append the events of the step to ``event_table``
             has_rupture_regime_ended   check the return to the slow manifold
-            advance_to_step_end        copy the end of the step to the beginning of the next step
-        set_unknowns_of_regime         after a change of regime
+            move_step_begin_to_step_end  copy the end of the step to the beginning of the next step
+        set_initial_unknowns_of_regime  after a change of regime
         start_next_segment             after the end of a loading segment
         enter_initial_regime           after the end of a loading segment
 

@@ -39,7 +39,7 @@ def resample_motion_along_path(
         Rows of a recorded motion.
     point_count : int
         Number of points.
-    variable_names : sequence of str, default: MOTION_VARIABLES
+    variable_names : sequence of str, default: MOTION_VARIABLE_NAMES
         Names of the returned variables. The variables must be the first columns of the table.
     engine : str, default: "scipy"
         Name of the engine that runs the resampling loop.

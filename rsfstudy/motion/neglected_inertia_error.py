@@ -164,7 +164,8 @@ def _compute_force_balance_residual(
         recorded_row[SPRING_AND_FRICTIONAL_STRESS_COLUMNS][0] - segment_scene.mu_star,
         *recorded_row[FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + segment_scene.state_count].tolist(),
     )
-    point = equations.point_function(state, equations.rate_function(state, parameters), parameters)
+    rates = equations.rate_function(state, parameters)
+    point = equations.motion_point_function(state, rates, parameters)
     missing: float = point.spring_stress - point.frictional_stress
     missing -= parameters[A] * inertia_weight * point.log_slip_rate_derivative
     return abs(missing) / parameters[A]

@@ -71,7 +71,7 @@ class PythonBackend:
 
         Parameters
         ----------
-        equations_by_regime : tuple of Equations
+        equations_by_regime : tuple of EquationsOfMotion
             Equations of the slow manifold. If the scene has inertia, the second item contains the
             inertial equations of motion in ruptures.
 
@@ -135,7 +135,7 @@ class PythonMotionState(SimpleNamespace):
 
     @property
     def motion_state_array(self) -> list[PythonMotionState]:
-        """Argument ``motion_memory`` of the event loop."""
+        """Argument ``motion_state_array`` of the event loop."""
         return [self]
 
     def get_work_and_row_counts(self) -> tuple[int, ...]:

@@ -111,7 +111,7 @@ def enter_initial_regime(
         Function table with one row per regime.
     slow_manifold_values : array
         Memory for ln(V/V_*) and friction on the slow manifold.
-    switch_thresholds : SwitchThresholds
+    switch_thresholds : RegimeSwitchThresholds
         Thresholds for changes between the regimes.
     parameters : array
         Parameters of the scene.

@@ -87,7 +87,7 @@ def compute_regime_switch_thresholds(scene: Scene, accuracy: Accuracy) -> Regime
 
     Returns
     -------
-    SwitchThresholds
+    RegimeSwitchThresholds
         Thresholds. All values are NaN if the scene has no inertia.
     """
     if not scene.has_mass:
@@ -112,7 +112,7 @@ def compute_slip_rate_norm(
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    switch_thresholds : SwitchThresholds
+    switch_thresholds : RegimeSwitchThresholds
         Thresholds, which include the inertial time.
 
     Returns
@@ -134,7 +134,7 @@ def compute_inertia_effect_over_limit(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     inertial_stress : float
         Difference between spring stress and friction, in sigma_*.
-    switch_thresholds : SwitchThresholds
+    switch_thresholds : RegimeSwitchThresholds
         Thresholds of the scene.
 
     Returns
@@ -195,7 +195,7 @@ def compute_slip_during_transition(
     ----------
     initial_log_slip_rate, final_log_slip_rate : float
         Natural logarithms :math:`\ln(V/V_*)` of both slip rates.
-    switch_thresholds : SwitchThresholds
+    switch_thresholds : RegimeSwitchThresholds
         Thresholds of the scene.
 
     Returns
@@ -236,7 +236,7 @@ def can_start_on_slow_manifold(
         Value of :math:`\ln(V/V_*)` on the slow manifold.
     inertial_stress : float
         Difference between spring stress and friction on the slow manifold, in sigma_*.
-    switch_thresholds : SwitchThresholds
+    switch_thresholds : RegimeSwitchThresholds
         Thresholds of the scene.
 
     Returns
@@ -277,7 +277,7 @@ def is_slip_slow_enough_for_slow_manifold(
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    switch_thresholds : SwitchThresholds
+    switch_thresholds : RegimeSwitchThresholds
         Thresholds of the scene.
 
     Returns
@@ -310,7 +310,7 @@ def should_switch_back_to_slow_manifold(
         Value :math:`x_s = \ln(V/V_*)` on the slow manifold.
     inertial_stress : float
         Difference between spring stress and friction on the slow manifold, in sigma_*.
-    switch_thresholds : SwitchThresholds
+    switch_thresholds : RegimeSwitchThresholds
         Thresholds of the scene.
 
     Returns

@@ -182,7 +182,7 @@ def has_rupture_regime_ended(motion, workspace):
     for i in range(motion.states):
         workspace.y_within[1 + i] = columns[FIRST_STATE + i]
     evaluate_function_into_array(
-        workspace.functions.fill_balance,
+        workspace.functions.fill_force_balance,
         workspace.y_within,
         workspace.y_within,
         workspace.parameters,

@@ -7,21 +7,24 @@ to ``motion_loop``, ``regime_starts`` or ``step_ends``.
 =========================================  ====================================================
 Arrays                                     Written by
 =========================================  ====================================================
-y                                          set_unknowns_of_regime, advance_to_step_end
+y                                          set_initial_unknowns_of_regime,
+                                           move_step_begin_to_step_end
 rates                                      stepper (at the start of a regime),
-                                           advance_to_step_end
+                                           move_step_begin_to_step_end
 y_end, rates_at_end                        stepper (each step),
-                                           step_integration.truncate_step_at_clock (y_end only)
+                                           step_integration.truncate_step_at (y_end only)
 stage_rates, order_eight_step_block,       steppers.order_eight
 dense_output_rows
 y_within                                   stepper (each interpolation), has_rupture_regime_ended
-rates_within, point_within                 step_integration.evaluate_point_at_clock,
+rates_within, point_within                 step_integration.evaluate_point_within_step,
                                            step_integration.is_dense_output_accurate (rates_within),
                                            has_rupture_regime_ended (point_within)
 dense_slopes                               step_integration.is_dense_output_accurate
-point_at_begin                             integrate_one_regime (at its start), advance_to_step_end
-point_at_end                               integrate_one_regime (each step), end_step_at_end_time,
-                                           step_integration.truncate_step_at_clock
+point_at_begin                             integrate_one_regime (at its start),
+                                           move_step_begin_to_step_end
+point_at_end                               integrate_one_regime (each step),
+                                           repeat_step_to_segment_end_time,
+                                           step_integration.truncate_step_at
 event_clocks, event_specs                  step_events.locate_events_in_step
 parameters, parameters_before              start_next_segment
 =========================================  ====================================================
@@ -96,7 +99,7 @@ class Workspace(NamedTuple):
         Number of event specifications.
     parameters, parameters_before : array
         Parameters of the scene after and before the last kink of the loading.
-    switch_thresholds : SwitchThresholds
+    switch_thresholds : RegimeSwitchThresholds
         Thresholds for changes between the regimes. All thresholds are NaN if the scene has no
         inertia.
     stepper : Stepper

@@ -62,7 +62,9 @@ def choose_figure(
         return corner_plots.posterior_figure(dataset)
     if name == _NAME_OF_FITS_FIGURE and user_figure is variable is None:
         return Declared(
-            importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").panels(dataset)
+            importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").build_panels_of_figure(
+                dataset
+            )
         ), dataset
     if (
         user_figure is None
@@ -153,7 +155,7 @@ def _build_generic_figure(dataset: xr.Dataset, variable: str | None = None) -> D
     if corner := corner_plots.build_corner_figure(dataset, variable):
         return corner
     for module in (maps, lines):
-        if found := module.panels(dataset, variable):
+        if found := module.build_panels_of_figure(dataset, variable):
             return Declared(found)
     choices = [
         str(name) for name, values in dataset.data_vars.items() if _axes.is_numeric_variable(values)

@@ -131,8 +131,8 @@ def _draw_healing_against_hold_duration(hold_table: xr.Dataset, axes: Axes) -> N
         suffix = "stderr" if f"{name}_stderr" in hold_table else "error"
         error = hold_table[f"{name}_{suffix}"].values
         axes.errorbar(
-            duration, sign * hold_table[name].values, _ERROR_BAR_HALF_LENGTH_IN_STDERRS * error, fmt="os"[number],
-            color=cycle_style(number)["color"], markersize=3.5, label=label,
+            duration, sign * hold_table[name].values, _ERROR_BAR_HALF_LENGTH_IN_STDERRS * error,
+            fmt="os"[number], color=cycle_style(number)["color"], markersize=3.5, label=label,
         )  # fmt: skip
     rate, stderr, level = (
         float(hold_table[n]) for n in ("healing_rate", "healing_rate_stderr", "healing_intercept")

@@ -310,9 +310,8 @@ def _format_curve_label(
     if name is None or not np.isfinite(curve_data.get(f"{panel.annotation}_stderr", np.nan)):
         return name
     symbol = find_quantity(panel.annotation, read_quantities_not_in_vocabulary(curve_data)).symbol
-    slope = f"{symbol} = {format_slope(curve_data, panel.annotation, _MAX_DECIMALS_OF_SLOPE)}".removeprefix(
-        " = "
-    )
+    slope = format_slope(curve_data, panel.annotation, _MAX_DECIMALS_OF_SLOPE)
+    slope = f"{symbol} = {slope}".removeprefix(" = ")
     # The equation is a single formula, so that a line break at the equals sign is impossible.
     return f"{name}: {slope.replace('$ = $', ' = ')}"
 

@@ -126,7 +126,7 @@ def draw_map(
         Name of the variable.
     map_dimensions : tuple of (str, str)
         Names of the y axis and the x axis.
-    colour_scale_and_contour_levels : tuple of (matplotlib.colors.Normalize, sequence of float), or None
+    colour_scale_and_contour_levels : tuple of (Normalize, sequence of float), or None
         Colour scale and contour levels. For a variable with flags, pass the flag values instead of
         contour levels. If the argument is None, the scale is computed from the values in the map.
     dataset : xarray.Dataset

@@ -23,10 +23,10 @@ else:
         __name__,
         {
             "referee.answer_comparison": ("AnswerComparison",),
-            "referee.problem_files": ("write_problems",),
+            "referee.problem_files": ("write_shipped_problems",),
             "referee.answer_file_comparison": (
                 "compare_file_with_known_answer",
-                "summarise_comparisons",
+                "summarise_answer_comparisons",
             ),
         },
     )

@@ -108,8 +108,8 @@ class BenchmarkProblem:
         Names of the requested quantities, which are columns of the answer.
     parameters : mapping of str to object
         Values of the parameters, as numbers in SI units or as strings with units. The parameters
-        ``a``, ``b_values``, ``D_c``, ``V_star`` and ``normal_stress`` are required. A law with two
-        state variables also needs ``b_2`` and ``D_c_2``. Optional parameters are ``mu_star``,
+        ``a``, ``b``, ``D_c``, ``V_star`` and ``normal_stress`` are required. A law with two state
+        variables also needs ``b_2`` and ``D_c_2``. Optional parameters are ``mu_star``,
         ``stiffness``, ``period``, ``mass``, ``radiation_damping``, ``V_c``, ``V_unstable``, and
         other fields of a scene.
     initial : mapping of str to object, optional

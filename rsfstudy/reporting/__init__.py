@@ -69,33 +69,36 @@ else:
         __name__,
         {
             "reporting.cell_tables": (
-                "build_frame_of_cells",
+                "build_data_frame_of_cells",
+                "build_failed_cells_table",
+                "count_cells_by_status",
                 "count_pending_cells",
-                "count_statuses",
-                "failures_table",
                 "format_notes_on_incomplete_results",
                 "format_status_counts",
             ),
-            "reporting.event_tables": ("build_record_events_pieces", "list_record_events"),
-            "reporting.fit_tables": (
-                "all_fits_are_valid",
-                "fit_table",
-                "is_fit",
-                "list_fit_values",
-                "split_into_single_fits",
+            "reporting.event_tables": (
+                "build_record_events_tables_and_sentences",
+                "summarise_record_events_as_fields",
             ),
-            "reporting.fit_summaries": ("format_with_error",),
+            "reporting.fit_tables": (
+                "are_all_fits_valid",
+                "build_fit_table",
+                "contains_fits",
+                "split_into_single_fits",
+                "summarise_fits_as_fields",
+            ),
+            "reporting.fit_summaries": ("format_value_with_stderr",),
             "reporting.hold_summaries": ("is_hold_table", "summarise_holds"),
             "reporting.lattice_tables": ("summarise_study_as_text_lines",),
             "reporting.json_summaries": (
-                "build_contents_table",
-                "classify_contents",
+                "build_result_variables_table",
+                "classify_file_contents",
                 "summarise_file_as_fields",
                 "summarise_study_as_fields",
             ),
             "reporting.origin_descriptions": (
                 "describe_scene_and_rig_fields",
-                "note_on_norms_near_load_velocity",
+                "describe_slow_instability_norms",
             ),
             "reporting.reduction_tables": ("build_reduction_tables_and_sentences",),
             "reporting.dataset_summaries": (
@@ -110,9 +113,9 @@ else:
                 "format_number_or_dash",
             ),
             "reporting.verdict_tables": (
-                "claims_table",
-                "count_verdicts",
-                "summarise_verdicts",
+                "build_claims_table",
+                "format_verdict_counts",
+                "summarise_verdicts_and_failures",
             ),
         },
     )

@@ -135,9 +135,9 @@ def build_failed_cells_table(dataset: xr.Dataset, results_file: str) -> TextTabl
     Returns
     -------
     TextTable
-        Table of the first 20 failed cells. Each entry of ``values`` has the keys ``coordinates``,
-        ``status``, ``message`` and ``command``. The value of ``command`` is a shell command that
-        recomputes the cell.
+        Table of the first 20 failed cells. Each entry of ``unformatted_rows`` has the keys
+        ``coordinates``, ``status``, ``message`` and ``command``. The value of ``command`` is a
+        shell command that recomputes the cell.
     """
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))

@@ -172,7 +172,7 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
 
         - Columns ``<name>_stderr`` contain standard errors. The standard errors of a row with the
           status ``errors_not_valid`` are not valid.
-        - Columns ``<name>_fitted_windows`` contain the range of a parameter over the windows.
+        - Columns ``<name>_windows`` contain the range of a parameter over the windows.
         - ``k`` is the stiffness divided by the normal stress in 1/um.
         - ``normal_stress`` is the mean normal stress before the step in MPa.
         - ``p_value`` is the p-value of the autocorrelation test of the whitened residuals.

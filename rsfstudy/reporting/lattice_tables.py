@@ -83,7 +83,8 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
         caption += f" ({which}; to write all cells, use rsfstudy export --csv)"
     table = build_table_along_dimensions(few, dims, columns, caption)
     about = {"name": name, "units": units}
-    return replace(table, values=[{**about, **row} for row in table.unformatted_rows])
+    rows = [{**about, **row} for row in table.unformatted_rows]
+    return replace(table, unformatted_rows=rows)
 
 
 def _find_fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:

@@ -88,7 +88,8 @@ def _build_slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
     names = {format_axis_name(dataset[d]) for d in slope.dims}
     table = build_table_along_dimensions(dataset, slope.dims, columns, description, names)
     about = {"name": reduction_name, "units": units}
-    return replace(table, values=[{**about, **row} for row in table.unformatted_rows])
+    rows = [{**about, **row} for row in table.unformatted_rows]
+    return replace(table, unformatted_rows=rows)
 
 
 def list_names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:

@@ -58,8 +58,8 @@ class TextTableColumn(NamedTuple):
     format_function : callable
         Function that formats a value of the variable.
     unformatted_key : str, default: ""
-        Key of the value in ``TextTable.values``. If the key is empty, the value is stored with the
-        coordinates of the row.
+        Key of the value in ``TextTable.unformatted_rows``. If the key is empty, the value is
+        stored with the coordinates of the row.
     """
 
     heading: str
@@ -204,8 +204,8 @@ def build_table_along_dimensions(
     -------
     TextTable
         Table whose rows contain the coordinates of a point and the formatted values. Each entry of
-        ``values`` has the key ``coordinates`` and the keys of the columns. Codes of categorical
-        variables are replaced by their labels.
+        ``unformatted_rows`` has the key ``coordinates`` and the keys of the columns. Codes of
+        categorical variables are replaced by their labels.
     """
     dims, rows, values = list(map(str, dimensions)), [], []
     flags = {

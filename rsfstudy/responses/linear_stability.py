@@ -22,7 +22,7 @@ from rsfstudy.responses.perturbation_growth import (
     GROWTH_OUTPUTS,
     add_growth_rate,
     compute_jacobian_of_steady_sliding,
-    max_growth_rate,
+    compute_max_growth_rate,
 )
 from rsfstudy.slider import Scene, SteadySliding, critical_stiffness_closed_form
 from rsfstudy.status import Status
@@ -296,7 +296,7 @@ def _find_stiffness_at_zero_growth(
 
     def growth_at(stiffness: float) -> float:
         changed = scene.with_(stiffness=stiffness)
-        return max_growth_rate(
+        return compute_max_growth_rate(
             compute_jacobian_of_steady_sliding(changed, steady_state, integrator)
         )
 

@@ -18,12 +18,12 @@ from rsfstudy.status import Status
 
 #: Step of the central differences, in units of the scale of an unknown. Rounding and truncation
 #: errors are of the same size at this step.
-_RELATIVE_DIFFERENCE_STEP = 1e-4
+_FINITE_DIFFERENCE_STEP_OVER_SCALE = 1e-4
 #: Dimensionless slip rate above which growth rates are computed from the inertial equations of
 #: motion. At lower slip rates, the effect of inertia is smaller than the rounding errors of the
 #: inertial equations of motion. At lower slip rates, the slow manifold, which is of second order in
 #: the mass, is accurate enough.
-_MIN_SLIP_RATE_NORM_FOR_FULL_EQUATIONS = 1e-3
+_MIN_RATE_NORM_FOR_INERTIAL_EQUATIONS = 1e-3
 #: Growth rates from the friction relation and from the equations of motion disagree if their
 #: relative difference exceeds the first number. The second number is the smallest growth rate, per
 #: unit slip in D_c, to which the difference is compared. The Jacobian has a relative error of 1e-8.
@@ -56,7 +56,7 @@ GROWTH_OUTPUTS = (
 def _needs_full_equations(scene: Scene, steady_state: SteadySliding) -> bool:
     """Return True if the slow manifold is too inaccurate at the given slip rate."""
     norm = scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
-    return bool(norm > _MIN_SLIP_RATE_NORM_FOR_FULL_EQUATIONS)
+    return bool(norm > _MIN_RATE_NORM_FOR_INERTIAL_EQUATIONS)
 
 
 def compute_jacobian_of_steady_sliding(
@@ -149,7 +149,7 @@ def add_growth_rate(
     return Outcome(Status.OK, values, why)
 
 
-def max_growth_rate(jacobian: np.ndarray) -> float:
+def compute_max_growth_rate(jacobian: np.ndarray) -> float:
     """Return the growth rate of the fastest-growing perturbation.
 
     Parameters
@@ -182,7 +182,7 @@ def compute_jacobian(equations: EquationsOfMotion, unknowns: tuple[float, ...]) 
     """
     columns = []
     for number, scale in enumerate(equations.unknown_scales):
-        step = _RELATIVE_DIFFERENCE_STEP * scale
+        step = _FINITE_DIFFERENCE_STEP_OVER_SCALE * scale
         ahead, behind = (
             equations.evaluate_rates(
                 tuple(x + sign * step * (i == number) for i, x in enumerate(unknowns))

@@ -52,7 +52,7 @@ else:
                 "slip_rate_from_log",
             ),
             "rig.columns": ("Column",),
-            "rig.column_reading": ("ColumnsOfSource", "ReadingOptions", "read_columns"),
+            "rig.column_reading": ("ColumnsReadFromSource", "ReadingOptions", "read_columns"),
             "rig.table_files": ("read_table",),
             "rig.common_headings": ("UsableColumns", "has_time_column"),
             "rig.units": (

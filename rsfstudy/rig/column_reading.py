@@ -127,7 +127,7 @@ def read_columns(
 
     Returns
     -------
-    ColumnsOfSource
+    ColumnsReadFromSource
         Columns with the selected rows.
 
     Raises

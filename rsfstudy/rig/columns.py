@@ -132,7 +132,7 @@ def parse_column_selection(column_choice: Any, headings: Collection[str]) -> Col
 
     Returns
     -------
-    ColumnSpec
+    ColumnSelection
         Selected column.
 
     Raises

@@ -179,7 +179,7 @@ def convert_dataset_units(
     Returns
     -------
     xarray.Dataset
-        Dataset in physical units. See `convert_dataset_by_unit_scales` for details.
+        Dataset in physical units. See `multiply_variables_by_unit_scales` for details.
     """
     units = {
         "sigma_*": stress, "D_c": length, "D_c/V_*": time, "V_*/D_c": f"{time}-1",

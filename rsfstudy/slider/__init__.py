@@ -29,9 +29,8 @@ has its own data structure:
    the fluid and the loading into the friction relation and the evolution of all states
    (``scene.friction_functions``).
 3. Equations: ``equations.EquationsOfMotion`` holds the rates, unknowns and parameters of a scene in
-one
-   regime. The functions for the rates and for the points are built from the friction functions and
-   from the functions of the dynamics. The SciPy integrators call
+   one regime. The functions for the rates and for the points are built from the friction functions
+   and from the functions of the dynamics. The SciPy integrators call
    ``EquationsOfMotion.rate_function`` directly.
 4. In-place functions: ``motion.in_place_functions.InPlaceFunctions`` converts the functions of
    ``EquationsOfMotion``, which take and return tuples, to functions that fill arrays.
@@ -113,21 +112,21 @@ else:
             "slider.scene_caching": ("cached_attribute", "cached_per_scene"),
             "slider.closed_forms": (
                 "CLOSED_FORMS",
-                "critical_stiffness as critical_stiffness_closed_form",
-                "effective_friction",
+                "compute_critical_stiffness as critical_stiffness_closed_form",
+                "compute_effective_friction",
             ),
             "slider.dynamics.inertia": ("NEGLIGIBLE_SECOND_ORDER_WEIGHT",),
-            "slider.equations": ("Equations",),
-            "slider.fluid": ("BUILT_IN_PARTS",),
+            "slider.equations": ("EquationsOfMotion",),
+            "slider.fluid": ("BUILT_IN_FLUID_CLASS_BY_NAME",),
             "slider.friction": ("FrictionFunctions",),
             "slider.loading": ("MIN_SEGMENT_DURATION",),
             "slider.parts": (
-                "Function",
-                "Numbers",
+                "NumericFunction",
+                "FloatTuple",
             ),
             "slider.path_length": (
                 "LOG_SLIP_RATE_PER_PATH_LENGTH",
-                "displacement_per_path_length",
+                "compute_displacement_per_path_length",
             ),
             "slider.motion_point": ("MotionPoint",),
             "slider.user_loadings": ("Protocol", "SEGMENT_MAPPING_KEYS", "UserLoading", "protocol"),

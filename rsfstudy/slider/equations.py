@@ -1,7 +1,8 @@
 """Equations of motion of a scene, in the form that the integrators require.
 
-`equations_between_ruptures` and `equations_in_rupture` are the main functions. Both functions
-return `Equations` with the names and scales of the unknowns, the rates and the parameters.
+`build_equations_between_ruptures` and `build_equations_in_rupture` are the main functions. Both
+functions return `EquationsOfMotion` with the names and scales of the unknowns, the rates and the
+parameters.
 """
 
 from __future__ import annotations
@@ -131,7 +132,7 @@ def build_equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Eq
 
     Returns
     -------
-    Equations
+    EquationsOfMotion
         Equations with path length as the independent variable.
     """
     return _build_equations_for_dynamics(scene, scene.dynamics, with_time=with_time)
@@ -150,7 +151,7 @@ def build_equations_without_mass(scene: SceneView, *, with_time: bool) -> Equati
 
     Returns
     -------
-    Equations
+    EquationsOfMotion
         Quasi-static equations with path length as the independent variable.
     """
     if scene.dynamics.build_rupture_rate_function is None:
@@ -220,7 +221,7 @@ def build_equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> 
 
     Returns
     -------
-    Equations
+    EquationsOfMotion
         Equations with path length as the independent variable.
 
     Raises
@@ -273,7 +274,7 @@ def build_equations_against_displacement(scene: SceneView) -> EquationsOfMotion:
 
     Returns
     -------
-    Equations
+    EquationsOfMotion
         Equations with displacement as the independent variable.
     """
     return _build_equations_for_dynamics(scene, scene.dynamics, with_time=False, along_path=False)
@@ -289,7 +290,7 @@ def build_equations_against_inertial_time(scene: SceneView) -> EquationsOfMotion
 
     Returns
     -------
-    Equations
+    EquationsOfMotion
         Equations with time in units of :math:`T/(2 \pi)` as the independent variable.
 
     Raises
@@ -317,7 +318,7 @@ def build_equations_at_imposed_slip_rate(
 
     Returns
     -------
-    Equations
+    EquationsOfMotion
         Equations whose last parameter is :math:`\ln(V/V_*)`.
     """
     friction, unknowns = scene.friction_functions, ("friction", *_list_state_names(scene)[1:])

@@ -100,7 +100,7 @@ def compute_state_evolution_derivatives(
         Derivatives with an error estimate.
     """
     evolutions, p = (
-        scene.friction_functions.evolutions,
+        scene.friction_functions.state_evolutions,
         scene.friction_parameter_values,
     )
     relation = build_friction_relation(scene, steady_state.states)

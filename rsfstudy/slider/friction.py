@@ -124,7 +124,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
     """
     law, source, loading = scene.parts.law, scene.pressure_source, scene.stress_loading
     oscillates, law_states = loading.has_load_point_unknown, law.state_count
-    boundary = -1 - len(scene.parts.fluid.unknowns) if loading.has_stress_unknowns else 0
+    boundary = -1 - len(scene.parts.fluid.unknowns) if loading.adds_normal_stress_unknowns else 0
     strength, effective, outer, derivatives = _build_functions_of_frictional_stress(
         scene.parts.normal_stress.normal_stress
         or friction_relation.return_zero_normal_stress_excess,
@@ -296,7 +296,7 @@ def build_state_evolution_function(
         Function ``(log_slip_rate, psis, shift)`` that returns the derivative of each state with
         respect to slip in :math:`D_c`.
     """
-    evolutions, p = scene.friction_functions.evolutions, scene.friction_parameter_values
+    evolutions, p = scene.friction_functions.state_evolutions, scene.friction_parameter_values
     return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
 
 

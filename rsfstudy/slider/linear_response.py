@@ -144,7 +144,7 @@ def _compute_state_weights_in_friction(
         )
         weights.append(-gained)
     if fluid:
-        by_pressure = scene.friction_functions.pressure_derivatives
+        by_pressure = scene.friction_functions.strength_derivatives_by_pressure
         gained, shifts[-1] = by_pressure(
             steady_state.frictional_stress, steady_state.states, scene.friction_parameter_values
         )

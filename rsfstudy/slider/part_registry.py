@@ -252,7 +252,7 @@ def find_slot_of_part_class(part_class: type[Part]) -> PartSlot:
 
     Returns
     -------
-    Slot
+    PartSlot
         Slot from whose base class the part is derived.
     """
     return next(slot for slot in PART_SLOTS if issubclass(part_class, slot.base_class))
@@ -263,7 +263,7 @@ def check_and_register_part(slot: PartSlot, part: Any) -> UserPart:
 
     Parameters
     ----------
-    slot : Slot
+    slot : PartSlot
         Slot that the part should fill.
     part : type or UserLoading
         Part to check.

@@ -87,7 +87,7 @@ def compute_time_per_displacement(velocity_ratio_values: VelocityRatios, p: Floa
     Parameters
     ----------
     velocity_ratio_values : tuple of float
-        Output of `velocity_ratios`.
+        Output of `compute_velocity_ratios`.
     p : tuple of float
         Parameters of the scene.
 
@@ -115,7 +115,7 @@ def compute_spring_stress_rate(
     relative_load_velocity, relative_slip_rate : float
         Load point velocity and slip rate, divided by the magnitude of the slip rate.
     velocity_ratio_values : tuple of float
-        Output of `velocity_ratios`.
+        Output of `compute_velocity_ratios`.
     p : tuple of float
         Parameters of the scene.
 
@@ -136,7 +136,7 @@ def compute_spring_stress_rate_with_noise(
     """Compute the derivative of the spring stress in a scene with noise.
 
     The last parameter of the scene is the rate at which noise changes the spring stress. See
-    `spring_stress_rate` for the arguments.
+    `compute_spring_stress_rate` for the arguments.
     """
     steady = compute_spring_stress_rate(
         relative_load_velocity, relative_slip_rate, velocity_ratio_values, p

@@ -47,7 +47,7 @@ def build_rate_function_by_displacement(
     r"""Return a function for the derivatives with respect to displacement.
 
     The returned function ``(state, p)`` computes the derivative of the spring stress, the
-    derivatives of the states and the output of `velocity_ratios`.
+    derivatives of the states and the output of `compute_velocity_ratios`.
 
     Notes
     -----

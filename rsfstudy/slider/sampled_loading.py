@@ -148,7 +148,7 @@ class SampledHistory(UserLoading):
         history = cls.from_table(
             columns, normal_stress_fall is not None, name, of_pressure=of_pressure
         )
-        return replace(history, first_reversal=first_load_point_reversal)
+        return replace(history, first_load_point_reversal=first_load_point_reversal)
 
     @classmethod
     def from_table(
@@ -175,7 +175,11 @@ class SampledHistory(UserLoading):
         samples = np.ascontiguousarray(sample_table, dtype=float).tobytes()
         digest = hashlib.sha256(samples).hexdigest()[:16]
         return cls(
-            name=name, samples=samples, digest=digest, of_stress=of_stress, of_pressure=of_pressure
+            name=name,
+            sample_table_bytes=samples,
+            digest=digest,
+            of_stress=of_stress,
+            of_pressure=of_pressure,
         )
 
     @property
@@ -289,7 +293,7 @@ class SampledHistory(UserLoading):
         """
         one = self.sample_table[segment_index].copy()
         one[TIME_COLUMN] = 0.0
-        return replace(self, samples=one.tobytes())
+        return replace(self, sample_table_bytes=one.tobytes())
 
 
 def _compute_log_velocity_magnitude(velocity: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 r"""Linear stability of steady sliding, computed from the friction relation.
 
-`critical_stiffness` and `largest_linear_growth_rate` are the main functions. Both functions work
-for any combination of parts.
+`compute_critical_stiffness` and `compute_largest_linear_growth_rate` are the main functions. Both
+functions work for any combination of parts.
 
 A small perturbation of slip, :math:`du`, grows as :math:`\exp(p s)` with slip :math:`s` in units of
 :math:`D_c`. The module ``linear_response`` computes the perturbation of the frictional stress,
@@ -262,7 +262,7 @@ def compute_largest_linear_growth_rate(
 
     Returns
     -------
-    GrowthRate or None
+    GrowthRateWithError or None
         Growth rate with an error estimate. The error estimate includes the errors of the
         derivatives of the law, and rounding errors. If steady sliding does not exist at this slip
         rate, the function returns None.
@@ -344,7 +344,7 @@ def compute_spring_response_to_normal_stress(
     steady = _compute_steady_sliding_or_raise(still, log_slip_rate)
     psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = (
-        scene.friction_functions.pressure_derivatives,
+        scene.friction_functions.strength_derivatives_by_pressure,
         scene.friction_parameter_values,
     )
     gained, shifted = by_pressure(steady.frictional_stress, psis, p)

@@ -15,8 +15,8 @@ parameters of the temperature follow the parameters of the law in the parameter 
 :math:`a q_a`, :math:`b q_b`, the pressurisation factor of the fluid, and the parameters that the
 temperature part declares.
 
-The function `build_replacements` is the main function. The class ``friction.FrictionFunctions``
-describes the arguments of the returned functions.
+The function `build_temperature_dependent_functions` is the main function. The class
+``friction.FrictionFunctions`` describes the arguments of the returned functions.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def build_temperature_dependent_functions(
     )
     evolutions, steady_states = find_evolutions_and_steady_states_of_law(parts.law)
     replacements: dict[str, Any] = {
-        "evolutions": _combine_law_temperature_and_other_rates(
+        "state_evolutions": _combine_law_temperature_and_other_rates(
             evolutions,
             source.auxiliary_rates,
             _build_temperature_rate_function(
@@ -114,10 +114,12 @@ def build_temperature_dependent_functions(
         ),
     }
     if any(parts.temperature.activation):
-        contribution = isothermal_functions["state_contribution"]
+        contribution = isothermal_functions["state_contribution_to_friction"]
         replacements |= {
             "strength": _add_temperature_to_strength(isothermal_functions["strength"], places),
-            "state_contribution": _add_temperature_to_state_contribution(contribution, places),
+            "state_contribution_to_friction": _add_temperature_to_state_contribution(
+                contribution, places
+            ),
             "state_variable": _build_state_variable_function(places),
         }
     return replacements
@@ -373,7 +375,7 @@ def compute_steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> f
         shift = -activated * compute_inverse_temperature_change(rise)
         steady = functions.steady_states(x, shift, p)
         psis = (*steady[:place], rise, *steady[place + 1 :])
-        return float(functions.evolutions(x, psis, shift, math.exp(min(x, 0.0)), p)[place])
+        return float(functions.state_evolutions(x, psis, shift, math.exp(min(x, 0.0)), p)[place])
 
     log_slip_rate = max(log_slip_rate, _MIN_HEATING_LOG_SLIP_RATE)
     count = max(1, math.ceil(abs(log_slip_rate) / _MAX_LOG_SLIP_RATE_CONTINUATION_STEP))

@@ -67,7 +67,7 @@ class CellJournal:
     fingerprint : mapping of str to object
         Settings that affect the results of all cells, as plain data. The fingerprint does not
         contain the scene fields and measure fields from which the cell keys are computed.
-    output_packer : OutputPacker
+    output_packer : CellOutputPacker
         Layout of the outputs of a cell.
     fresh : bool, default: False
         If True, delete an existing journal first.
@@ -184,7 +184,7 @@ class CellJournal:
 
         Parameters
         ----------
-        journal_rows : iterable of StoredCellRow
+        journal_rows : iterable of CellJournalRow
             Rows of the finished cells. If the journal already contains a row with the same key, the
             new row replaces this row.
 
@@ -236,7 +236,7 @@ class CellJournal:
 
         Returns
         -------
-        CellColumns
+        CellResultArrays
             Columns of the cells, in the order of ``cell_keys``. If the journal does not contain a
             cell, its status is ``PENDING``.
 
@@ -326,7 +326,7 @@ class CellWallTimes:
 
         Returns
         -------
-        CellTimings or None
+        CellWallTimes or None
             Wall times, or None if the journal does not exist, is damaged, or is locked by a run.
         """
         try:

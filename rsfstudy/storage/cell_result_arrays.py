@@ -91,7 +91,7 @@ class CellOutputPacker:
 
         Returns
         -------
-        StoredCellRow
+        CellJournalRow
             Row of the journal, including the checksum.
         """
         numbers, work = self.pack_outputs(outcome.values), outcome.rhs_evaluations
@@ -136,7 +136,7 @@ class CellResultArrays:
 
         Returns
         -------
-        CellColumns
+        CellResultArrays
             Columns with the status ``PENDING`` and NaN outputs.
         """
         return cls(

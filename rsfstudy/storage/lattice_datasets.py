@@ -56,7 +56,7 @@ def assemble_study_dataset(
         Study whose cells are assembled.
     coordinates : mapping of str to tuple or xarray.Variable
         Coordinates of the lattice (see ``LatticeCoordinatesBuilder``).
-    cell_arrays : CellColumns
+    cell_arrays : CellResultArrays
         Columns of all cells, in row-major order.
     provenance : mapping of str to object
         Provenance of the run, as plain data (see ``execution.provenance.collect_provenance``).
@@ -83,7 +83,7 @@ def build_lattice_variables(
     ----------
     study : Study
         Study to which the cells belong.
-    cell_arrays : CellColumns
+    cell_arrays : CellResultArrays
         Columns of the cells in the block, in row-major order.
     block_shape : tuple of int
         Shape of the block.

@@ -211,7 +211,7 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> ResultsComparison:
 
     Returns
     -------
-    Comparison
+    ResultsComparison
         Differences between the datasets.
 
     Raises

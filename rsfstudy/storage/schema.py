@@ -2,7 +2,7 @@
 
 ``check_results_dataset`` checks a file before any other function uses the file. Error messages
 contain the path of the invalid entry, for example ``declaration.claims[3].id``. The module
-``declarations`` contains the schema of the declaration.
+``stored_declarations`` contains the schema of the declaration.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class StoredProvenance(TypedDict):
         File that declares the study. The string is empty if the study was not declared in a file.
     versions : mapping of str to str
         Versions of Python and of the main packages.
-    fingerprint : StoredFingerprint
+    fingerprint : StoredRunFingerprint
         Versions, settings and code digests that affect the results.
     git : str
         Commit of rsfstudy.
@@ -204,7 +204,7 @@ def read_study_declaration(dataset: xr.Dataset) -> StoredStudyDeclaration:
 
     Returns
     -------
-    StoredDeclaration
+    StoredStudyDeclaration
         Declaration of the study.
 
     Raises

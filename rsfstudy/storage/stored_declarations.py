@@ -188,7 +188,7 @@ def parse_study_declaration(plain_data: Any) -> StoredStudyDeclaration:
 
     Returns
     -------
-    StoredDeclaration
+    StoredStudyDeclaration
         Declaration of the study.
 
     Raises
@@ -265,7 +265,7 @@ def find_user_part_missing_from_file(
 
     Parameters
     ----------
-    declaration : StoredDeclaration
+    declaration : StoredStudyDeclaration
         Declaration of the study.
     stored_loadings : collection of str, optional
         Names of the user-defined loadings that the file contains.

@@ -177,7 +177,7 @@ def build_study_from_declaration(
 
     Parameters
     ----------
-    declaration : StoredDeclaration
+    declaration : StoredStudyDeclaration
         Declaration from a results file.
     stored_loadings : mapping of str to UserPart
         User-defined loadings from the results file, by name.

@@ -42,7 +42,7 @@ else:
         __name__,
         {
             "study.study_loader": ("load_study",),
-            "study.lattice_cell": ("Cell", "CellChanges"),
+            "study.lattice_cell": ("Cell", "CellFieldChanges"),
             "study.claims": (
                 "Claim",
                 "build_verdict_table",
@@ -52,12 +52,16 @@ else:
                 "Figure",
                 "Panel",
             ),
-            "study.reductions.base": ("failed_cell_mask", "read_quantities_not_in_vocabulary"),
+            "study.reductions.base": ("is_failed_or_pending", "read_quantities_not_in_vocabulary"),
             "study.conversion_to_rig_units": ("convert_study_to_rig_units",),
             "study.study": ("Study",),
-            "study.named_study_index": ("STUDIES_PACKAGE", "study_names", "study_titles"),
-            "study.user_defined_parts": ("find_named_user_parts",),
-            "study.claim_verdict_table": ("format_verdict_row",),
+            "study.named_study_index": (
+                "NAMED_STUDIES_PACKAGE",
+                "list_study_names",
+                "read_study_titles",
+            ),
+            "study.user_defined_parts": ("find_user_parts_in_axis_rows",),
+            "study.claim_verdict_table": ("format_verdict_row_for_report",),
         },
     )
 

@@ -302,7 +302,7 @@ def build_verdict_table(
 
     Returns
     -------
-    VerdictTable
+    ClaimVerdictTable
         Table of the claims and verdicts. The column ``verdict_changed`` is True if an applicable
         claim does not have the expected verdict. If the error estimate of a result exceeds the
         tolerance of its claim, the table has the column ``note``, which contains this information.

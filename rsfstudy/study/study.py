@@ -372,7 +372,7 @@ class Study:
 
         Returns
         -------
-        CellChanges
+        CellFieldChanges
             Changed fields of the base scene and of the measure.
         """
         return self._compute_cell_changes(self._find_axis_rows_of_cell(number))

@@ -49,7 +49,7 @@ def record_calls(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
         kept.append(copy_arguments(arguments))
         return run(*arguments)
 
-    with mock.patch.object(numba_backend, "get_compiled_loop", return_value=noting):
+    with mock.patch.object(numba_backend, "compile_or_load_motion_loop", return_value=noting):
         measure(scene, ACCURACY)
     return kept
 

@@ -42,7 +42,7 @@ class CompareCommandResult(CommandResult):
         Paths of both files.
     provenance : sequence of mapping of str to object
         Provenance of both files.
-    differences : Comparison
+    differences : ResultsComparison
         Differences between the files.
     """
 

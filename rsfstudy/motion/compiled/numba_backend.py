@@ -98,7 +98,7 @@ class NumbaBackend:
 
         Parameters
         ----------
-        equations_by_regime : tuple of Equations
+        equations_by_regime : tuple of EquationsOfMotion
             Equations of the slow manifold. If the scene has inertia, the second item contains the
             inertial equations of motion in ruptures.
 
@@ -166,7 +166,7 @@ class NumbaMotionState:
     Attributes
     ----------
     motion_state_array : ndarray of MOTION_STATE_DTYPE, shape (1,)
-        Argument ``motion_memory`` of the event loop.
+        Argument ``motion_state_array`` of the event loop.
     """
 
     def __init__(self, initial: bytes, called_with: tuple[float, ...]) -> None:
@@ -342,7 +342,7 @@ def get_compiled_function_addresses(equations: EquationsOfMotion) -> tuple[int, 
 
     Parameters
     ----------
-    equations : Equations
+    equations : EquationsOfMotion
         System of equations.
 
     Returns

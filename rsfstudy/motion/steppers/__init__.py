@@ -31,7 +31,7 @@ class Stepper(ABC):
 
     Parameters
     ----------
-    systems : tuple of Equations
+    systems : tuple of EquationsOfMotion
         Equations of each regime, indexed by ``motion.regime``.
     methods : mapping of str to str
         Names of integration methods for regimes. A stepper with a single method ignores this

@@ -420,7 +420,7 @@ class OrderEightStepper(Stepper):
 
     Parameters
     ----------
-    systems : tuple of Equations
+    systems : tuple of EquationsOfMotion
         Equations of each regime, indexed by ``motion.regime``.
     methods : mapping of str to str
         Ignored, because the stepper has a single method.

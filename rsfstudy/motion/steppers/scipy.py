@@ -64,7 +64,7 @@ class SciPyStepper(Stepper):
 
     Parameters
     ----------
-    systems : tuple of Equations
+    systems : tuple of EquationsOfMotion
         Equations of each regime, indexed by ``motion.regime``.
     methods : mapping of str to str
         Names of SciPy solvers for regimes. The default is ``"DOP853"``.

@@ -2,8 +2,8 @@
 
 Each module of this package reads one group of file formats. A reader consists of two functions: the
 first function checks if a source has the format of the reader, based on its first bytes or its
-type, and the second function converts the source to a ``Table``. To add a format, write the two
-functions, and add them to ``FORMAT_TESTS_AND_READERS``.
+type, and the second function converts the source to a ``SourceTable``. To add a format, write the
+two functions, and add them to ``FORMAT_TESTS_AND_READERS``.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def read_table_from_source(
 
     Returns
     -------
-    Table
+    SourceTable
         Columns of the source.
 
     Raises

@@ -24,7 +24,7 @@ def is_mapping_or_dataframe(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Source.
 
     Returns
@@ -42,20 +42,20 @@ def read_mapping_or_dataframe(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Mapping of headings to arrays, or DataFrame. If no heading contains units, the arrays are in
         the default units.
 
     Returns
     -------
-    Table
+    SourceTable
         Table of the arrays.
     """
     keys = [*source.path_or_object]
     headings = [*map(str, keys)]
     has_units = any("(" in heading or "[" in heading for heading in headings)
     table = _build_table_of_mapping(source.path_or_object, keys, headings)
-    return replace(table, default_units=not has_units, has_only_columns=not has_units)
+    return replace(table, uses_default_units=not has_units, headings_are_column_names=not has_units)
 
 
 def is_xarray_dataset(source: TableSource) -> bool:
@@ -63,7 +63,7 @@ def is_xarray_dataset(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Source.
 
     Returns
@@ -79,12 +79,12 @@ def read_xarray_dataset(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Dataset. The units of variables are read from their attribute ``units``.
 
     Returns
     -------
-    Table
+    SourceTable
         Table of the one-dimensional variables.
     """
     return _build_table_of_dataset(source.path_or_object)
@@ -95,7 +95,7 @@ def is_netcdf_file(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Returns
@@ -111,12 +111,12 @@ def read_netcdf_file(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         NetCDF file.
 
     Returns
     -------
-    Table
+    SourceTable
         Table of the one-dimensional variables.
 
     Raises
@@ -141,7 +141,7 @@ def is_record_object(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Source.
 
     Returns
@@ -157,12 +157,12 @@ def read_columns_of_record(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Record.
 
     Returns
     -------
-    Table
+    SourceTable
         Table of the columns, whose headings contain their units.
     """
     columns = source.path_or_object.columns
@@ -177,7 +177,7 @@ def _build_table_of_dataset(dataset: xr.Dataset) -> SourceTable:
     table = _build_table_of_mapping(
         dataset, names, append_units_to_headings([*map(str, names)], units)
     )
-    return replace(table, default_units=not any(units))
+    return replace(table, uses_default_units=not any(units))
 
 
 def _build_table_of_mapping(mapping: Any, keys: list[Any], headings: list[str]) -> SourceTable:

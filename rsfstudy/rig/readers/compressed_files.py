@@ -32,7 +32,7 @@ def is_compressed_file(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Returns
@@ -51,12 +51,12 @@ def decompress_file(source: TableSource) -> TableSource:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Compressed file.
 
     Returns
     -------
-    Source
+    TableSource
         Source with the decompressed content.
 
     Raises
@@ -81,4 +81,4 @@ def decompress_file(source: TableSource) -> TableSource:
             "decompression, which is "
             "too much for a text file of this size. Decompress the file before you read it."
         )
-    return replace(source, content=content)
+    return replace(source, file_bytes=content)

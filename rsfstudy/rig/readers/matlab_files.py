@@ -24,7 +24,7 @@ def is_matlab_file(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Returns
@@ -43,12 +43,12 @@ def read_matlab_file(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         MATLAB file.
 
     Returns
     -------
-    Table
+    SourceTable
         Columns of equal length. If the arrays differ in length, the table contains only the arrays
         with the most common length. If several lengths are equally common, the longest of these
         lengths is used.

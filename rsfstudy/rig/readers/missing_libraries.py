@@ -13,7 +13,7 @@ def build_missing_library_error(
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
     format_name : str
         Name of the format with an indefinite article.

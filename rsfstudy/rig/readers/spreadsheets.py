@@ -39,7 +39,7 @@ def is_workbook(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Returns
@@ -62,12 +62,12 @@ def read_workbook(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Workbook. By default, the first sheet is read.
 
     Returns
     -------
-    Table
+    SourceTable
         Columns of the sheet.
 
     Raises

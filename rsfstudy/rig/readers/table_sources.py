@@ -200,7 +200,7 @@ class SourceTable:
         ----------
         quantity_name : str
             Name of the quantity for error messages.
-        column_selection : ColumnSpec
+        column_selection : ColumnSelection
             Heading of the column with units, scale and offset. If the units in the file are missing
             or unknown, the units of the selection are used.
 
@@ -273,7 +273,7 @@ def build_table_of_arrays(
 
     Returns
     -------
-    Table
+    SourceTable
         Table with the arrays.
     """
 

@@ -29,7 +29,7 @@ def is_tdms_file(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Returns
@@ -47,12 +47,12 @@ def read_tdms_file(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         TDMS file. By default, the first group with channels is read.
 
     Returns
     -------
-    Table
+    SourceTable
         Channels with their units.
 
     Raises

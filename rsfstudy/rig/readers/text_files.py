@@ -67,7 +67,7 @@ def is_text_file(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Returns
@@ -91,12 +91,12 @@ def read_text_file(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Text file in UTF-8, UTF-16 or Windows-1252.
 
     Returns
     -------
-    Table
+    SourceTable
         Columns of the file.
 
     Raises

@@ -40,7 +40,7 @@ def is_unsupported_format(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Returns
@@ -56,7 +56,7 @@ def raise_unsupported_format_error(source: TableSource) -> NoReturn:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Raises

@@ -25,7 +25,7 @@ def is_binary_file(source: TableSource) -> bool:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         File.
 
     Returns
@@ -45,12 +45,12 @@ def read_xlook_file(source: TableSource) -> SourceTable:
 
     Parameters
     ----------
-    source : Source
+    source : TableSource
         Binary file.
 
     Returns
     -------
-    Table
+    SourceTable
         Columns of the file, with the units in the file.
 
     Raises

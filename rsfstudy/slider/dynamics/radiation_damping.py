@@ -22,7 +22,7 @@ _NEWTON_STEP_RTOL = 1e-15
 _STRESS_BALANCE_RTOL = 1e-6
 #: Upper limit of ln V, at which the radiated stress is 10^300 eta. Only trial steps of the
 #: integrator reach the upper limit of ln V.
-_LOG_SLIP_RATE_UPPER_LIMIT = 690.0
+_MAX_LOG_SLIP_RATE_OF_STRESS_BALANCE = 690.0
 
 
 def compute_radiated_stress(log_slip_rate: float, damping_coefficient: float) -> float:
@@ -83,7 +83,7 @@ def build_damped_slip_rate_functions(
             -math.inf,
             min(
                 (strength(spring_stress + damping, psis, p)[0] - psi) / a,
-                _LOG_SLIP_RATE_UPPER_LIMIT,
+                _MAX_LOG_SLIP_RATE_OF_STRESS_BALANCE,
             ),
         )
         # This initial value is accurate if radiation balances most of the spring stress.

@@ -43,7 +43,7 @@ class LevelCrossing(NamedTuple):
         Position of the crossing.
     lower_bound, upper_bound : float
         Bounds of the position.
-    status : CrossingStatus
+    status : CrossingSearchStatus
         Outcome of the search.
     """
 
@@ -65,7 +65,7 @@ def find_unique_crossing(x: np.ndarray, y: np.ndarray, level: float) -> LevelCro
 
     Returns
     -------
-    Crossing
+    LevelCrossing
         The position and the bounds are NaN unless the samples cross the level exactly once. The
         status is ``UNRESOLVED`` if the curve could oscillate between two samples and thereby reach
         the level in another interval.

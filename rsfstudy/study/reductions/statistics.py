@@ -84,7 +84,7 @@ class _SampleStatistic(Reduction):
         TypeError
             If a subclass does not override this method.
         """
-        raise TypeError(f"{type(self).__name__} does not define compute")
+        raise TypeError(f"{type(self).__name__} does not define compute_value_and_stderr")
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compute the statistic along the sample dimension.
