@@ -616,7 +616,7 @@ def build_getattr_for_former_names(module_name: str) -> Callable[[str], Any]:
 
 
 def add_former_member_names(
-    owner_class: DecoratedClass, *, writable: bool = False
+    owner_class: DecoratedClass, *, allow_assignment: bool = False
 ) -> DecoratedClass:
     """Add the former names of members to a class.
 
@@ -632,11 +632,15 @@ def add_former_member_names(
     type
         The modified class.
     """
-    for former, new in NEW_NAME_BY_OWNER_AND_FORMER_NAME[_build_owner_key(owner_class)].items():
+    for former, new in NEW_NAME_BY_OWNER_AND_FORMER_NAME[
+        _format_module_and_qualified_name(owner_class)
+    ].items():
         setattr(
             owner_class,
             former,
-            (_WritableFormerNameDescriptor if writable else _FormerNameDescriptor)(former, new),
+            (_WritableFormerNameDescriptor if allow_assignment else _FormerNameDescriptor)(
+                former, new
+            ),
         )
     return owner_class
 
@@ -656,7 +660,7 @@ def translate_former_member_name(owner_class: type, member_name: str) -> str:
     str
         New name. A name that is not a former name is returned unchanged.
     """
-    new = NEW_NAME_BY_OWNER_AND_FORMER_NAME[_build_owner_key(owner_class)].get(
+    new = NEW_NAME_BY_OWNER_AND_FORMER_NAME[_format_module_and_qualified_name(owner_class)].get(
         member_name, member_name
     )
     if new != member_name:
@@ -664,7 +668,7 @@ def translate_former_member_name(owner_class: type, member_name: str) -> str:
     return new
 
 
-def add_new_names_for_former_members(subclass: type) -> None:
+def add_new_names_for_former_overrides(subclass: type) -> None:
     """Add the new names of members that a subclass defines under former names.
 
     If the subclass also defines the new name, the former name is ignored. A dataclass field becomes
@@ -678,7 +682,7 @@ def add_new_names_for_former_members(subclass: type) -> None:
     """
     for base in subclass.__mro__[1:]:
         for former, new in NEW_NAME_BY_OWNER_AND_FORMER_NAME.get(
-            _build_owner_key(base), {}
+            _format_module_and_qualified_name(base), {}
         ).items():
             own, annotation = (
                 vars(subclass),
@@ -708,7 +712,9 @@ def accept_former_keyword_names(function_or_class: DecoratedFunction) -> Decorat
     callable or type
         Wrapped function, or the class with a wrapped constructor.
     """
-    table = NEW_NAME_BY_OWNER_AND_FORMER_NAME[f"{_build_owner_key(function_or_class)}()"]
+    table = NEW_NAME_BY_OWNER_AND_FORMER_NAME[
+        f"{_format_module_and_qualified_name(function_or_class)}()"
+    ]
     owner: Any = function_or_class
     wrapped = owner.__init__ if isinstance(function_or_class, type) else function_or_class
 
@@ -759,6 +765,6 @@ def _build_property_reading_field(field_name: str) -> property:
     return property(lambda self: getattr(self, field_name))
 
 
-def _build_owner_key(class_or_function: Any) -> str:
+def _format_module_and_qualified_name(class_or_function: Any) -> str:
     """Return the key of a class or function in ``NEW_NAME_BY_OWNER_AND_FORMER_NAME``."""
     return f"{class_or_function.__module__}:{class_or_function.__qualname__}"

@@ -70,7 +70,7 @@ def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
 
 
 def find_string_instead_of_list_error(
-    function: Callable[..., Any], arguments: Mapping[str, Any], error: Exception
+    function: Callable[..., Any], arguments: Mapping[str, Any], raised_exception: Exception
 ) -> InvalidValue | None:
     """Return an error if a string was passed in place of a list of strings.
 
@@ -93,7 +93,7 @@ def find_string_instead_of_list_error(
         Error that names the argument. The value is None if no string was passed in place of a list.
     """
     for name, value, annotation in _iterate_annotated_arguments(function, arguments):
-        blamed = getattr(error, "value", None)
+        blamed = getattr(raised_exception, "value", None)
         if not isinstance(value, str) or (isinstance(blamed, str) and blamed == value):
             continue
         if _allows_list_of_strings(annotation) and not matches_annotation(value, annotation):
@@ -132,7 +132,7 @@ def find_type_mismatch_error(
 
 
 def find_unusable_value_error(
-    arguments: Mapping[str, Any], error: Exception, remedy: str
+    arguments: Mapping[str, Any], raised_exception: Exception, remedy: str
 ) -> InvalidValue | None:
     """Return an error for the first argument that may have caused an exception.
 
@@ -162,21 +162,25 @@ def find_unusable_value_error(
                 return InvalidValue(name, value, "is too large", remedy=remedy)
             if isinstance(part, str) and not _is_encodable_as_utf8(part):
                 return InvalidValue(name, value, "must be a string that can be encoded as UTF-8")
-        if (dimension := _find_missing_dimension_in_error(value, error)) is not None:
+        if (dimension := _find_missing_dimension_in_error(value, raised_exception)) is not None:
             rule, dims = f"has no dimension {shorten_text(dimension)!r}", map(str, value.dims)
             return InvalidValue(name, value, rule, choices=dims, remedy=remedy)
-        if isinstance(error, OSError) and _is_substring_of_path(value, error.filename):
-            rule = f"cannot be used as a file name: {error.strerror}"
+        if isinstance(raised_exception, OSError) and _is_substring_of_path(
+            value, raised_exception.filename
+        ):
+            rule = f"cannot be used as a file name: {raised_exception.strerror}"
             return InvalidValue(name, value, rule, remedy=remedy)
-        is_outside = isinstance(error, IndexError) or "out of bounds" in str(error)
+        is_outside = isinstance(raised_exception, IndexError) or "out of bounds" in str(
+            raised_exception
+        )
         if is_outside and isinstance(value, Integral):
             return InvalidValue(name, value, "is out of range", remedy=remedy)
-        if isinstance(value, str) and value == _find_missing_name_in_error(error):
+        if isinstance(value, str) and value == _find_missing_name_in_error(raised_exception):
             return InvalidValue(name, value, "is unknown", remedy=remedy)
-        if name != "self" and callable(value) and _was_raised_by(value, error):
+        if name != "self" and callable(value) and _was_raised_by(value, raised_exception):
             rule = (
-                f"raised an error when it was called ({type(error).__name__}: "
-                f"{shorten_text(error)})"
+                f"raised an error when it was called ({type(raised_exception).__name__}: "
+                f"{shorten_text(raised_exception)})"
             )
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
@@ -350,7 +354,7 @@ def _is_matching_container(
         )
     if not issubclass(container_type, Iterable):
         return isinstance(value, container_type)
-    if not _is_sequence_like(value, container_type):
+    if not _behaves_like_container(value, container_type):
         return False
     items = list(itertools.islice(typing.cast(Iterable[Any], value), _MAX_CHECKED_ITEMS))
     if container_type is tuple and item_annotations and Ellipsis not in item_annotations:
@@ -365,7 +369,7 @@ def _is_matching_container(
     )
 
 
-def _is_sequence_like(value: object, container_type: type) -> bool:
+def _behaves_like_container(value: object, container_type: type) -> bool:
     """Return True if a value behaves like a container type."""
     if isinstance(value, str | bytes):
         return False
@@ -397,7 +401,7 @@ def _iterate_annotated_arguments(
     for name, parameter in inspect.signature(function).parameters.items():
         if name not in arguments or parameter.annotation is parameter.empty or name == "self":
             continue
-        value, annotation = arguments[name], _resolve_annotation(function, parameter.annotation)
+        value, annotation = arguments[name], _evaluate_annotation(function, parameter.annotation)
         if parameter.kind is parameter.VAR_KEYWORD:
             yield from ((key, each, annotation) for key, each in value.items())
         elif parameter.kind is parameter.VAR_POSITIONAL:
@@ -406,7 +410,7 @@ def _iterate_annotated_arguments(
             yield name, value, annotation
 
 
-class _AnnotationNamespace(dict[str, Any]):
+class _AnnotationEvaluationNamespace(dict[str, Any]):
     """Namespace in which string annotations are evaluated.
 
     The namespace contains the global names of the module. Other names are looked up among the known
@@ -425,7 +429,7 @@ class _AnnotationNamespace(dict[str, Any]):
         raise KeyError(name)
 
 
-def _resolve_annotation(function: Callable[..., Any], annotation: Any) -> Any:
+def _evaluate_annotation(function: Callable[..., Any], annotation: Any) -> Any:
     """Evaluate an annotation, or return ``Any`` if a name is unknown."""
     annotation = getattr(annotation, "__forward_arg__", annotation)
     if not isinstance(annotation, str):
@@ -433,7 +437,7 @@ def _resolve_annotation(function: Callable[..., Any], annotation: Any) -> Any:
     known = getattr(inspect.unwrap(function), "__globals__", {})
     names = {name: kind for name, kind in known.items() if kind is not Any or name == "Any"}
     try:
-        return eval(annotation, {}, _AnnotationNamespace(names))
+        return eval(annotation, {}, _AnnotationEvaluationNamespace(names))
     except (NameError, AttributeError, TypeError):
         return Any
 

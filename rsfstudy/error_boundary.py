@@ -42,7 +42,7 @@ _MODULES_SKIPPED_WHEN_FINDING_CALLER = ("dataclasses", "functools", "rsfstudy._d
 def error_boundary(
     function: Callable[FunctionParameters, FunctionResult],
     *,
-    is_called_internally: bool = False,
+    applies_to_internal_calls: bool = False,
     unchanged_exceptions: tuple[type[Exception], ...] = _EXCEPTIONS_PASSED_UNCHANGED,
 ) -> Callable[FunctionParameters, FunctionResult]:
     """Wrap a function so that it raises only errors of rsfstudy.
@@ -71,7 +71,7 @@ def error_boundary(
     """
     return _wrap_in_error_boundary(
         function,
-        is_called_internally=is_called_internally,
+        applies_to_internal_calls=applies_to_internal_calls,
         unchanged_exceptions=unchanged_exceptions,
     )
 
@@ -153,7 +153,7 @@ def _list_constructor_parameters(cls: type) -> tuple[str, ...]:
 def _wrap_in_error_boundary(
     function: Callable[FunctionParameters, FunctionResult],
     *,
-    is_called_internally: bool = False,
+    applies_to_internal_calls: bool = False,
     is_constructor: bool = False,
     unchanged_exceptions: tuple[type[Exception], ...] = _EXCEPTIONS_PASSED_UNCHANGED,
 ) -> Callable[FunctionParameters, FunctionResult]:
@@ -190,7 +190,7 @@ def _wrap_in_error_boundary(
         if is_constructor:
             args = tuple(map(convert_numpy_number_to_python, args))  # type: ignore[assignment]
             options = {key: convert_numpy_number_to_python(value) for key, value in options.items()}  # type: ignore[assignment]
-        if not is_called_internally and _is_called_from_rsfstudy():
+        if not applies_to_internal_calls and _is_called_from_rsfstudy():
             try:
                 return function(*args, **options)
             except TypeError:

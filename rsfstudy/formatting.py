@@ -15,7 +15,7 @@ _MAX_LISTED_VALUES = 8
 _LONG_DECIMAL_NUMBER_PATTERN = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 
-def read_flag_meanings(attributes: Mapping[str, Any]) -> dict[float, str]:
+def read_flag_meanings(variable_attributes: Mapping[str, Any]) -> dict[float, str]:
     """Read the meaning of each flag value from CF attributes.
 
     Parameters
@@ -28,8 +28,10 @@ def read_flag_meanings(attributes: Mapping[str, Any]) -> dict[float, str]:
     dict of float to str
         Meanings by flag value. The dictionary is empty for a variable without flags.
     """
-    words = str(attributes.get("flag_meanings", "")).split()
-    return dict(zip(np.ravel(attributes.get("flag_values", [])).tolist(), words, strict=False))
+    words = str(variable_attributes.get("flag_meanings", "")).split()
+    return dict(
+        zip(np.ravel(variable_attributes.get("flag_values", [])).tolist(), words, strict=False)
+    )
 
 
 def is_sequence_of_axis_values(value: Any) -> bool:
@@ -68,11 +70,13 @@ def format_overrides(overrides: Mapping[str, Any]) -> str:
     texts = {
         name: value if isinstance(value, list) else [value] for name, value in overrides.items()
     }
-    told = ", ".join(f"{name}={format_list(values)}" for name, values in texts.items())
-    return _LONG_DECIMAL_NUMBER_PATTERN.sub(lambda found: format_value(float(found[0])), told)
+    told = ", ".join(f"{name}={format_abbreviated_list(values)}" for name, values in texts.items())
+    return _LONG_DECIMAL_NUMBER_PATTERN.sub(
+        lambda found: format_number_or_text(float(found[0])), told
+    )
 
 
-def format_list(values: Sequence[Any], separator: str = ",") -> str:
+def format_abbreviated_list(values: Sequence[Any], separator: str = ",") -> str:
     """Format a list of values, and abbreviate a long list.
 
     Parameters
@@ -88,7 +92,7 @@ def format_list(values: Sequence[Any], separator: str = ",") -> str:
         All values if there are at most eight. Otherwise the first three values and the last value,
         with an ellipsis between them.
     """
-    shown = [format_value(value) for value in values]
+    shown = [format_number_or_text(value) for value in values]
     return separator.join(
         shown if len(shown) <= _MAX_LISTED_VALUES else [*shown[:3], "...", shown[-1]]
     )
@@ -112,7 +116,7 @@ def format_count_with_noun(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'s' * (count != 1)}"
 
 
-def format_value(value: Any) -> str:
+def format_number_or_text(value: Any) -> str:
     """Format a value, with at most six significant digits for floats.
 
     Parameters
@@ -128,7 +132,7 @@ def format_value(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
 
 
-def format_nonempty_fields(fields: Mapping[str, Any]) -> str:
+def format_fields_except_none(fields: Mapping[str, Any]) -> str:
     """Format the fields that are not None.
 
     Parameters
@@ -142,7 +146,7 @@ def format_nonempty_fields(fields: Mapping[str, Any]) -> str:
         Text such as ``a = 0.01, law = slip``.
     """
     return ", ".join(
-        f"{n} = {format_value(value)}" for n, value in fields.items() if value is not None
+        f"{n} = {format_number_or_text(value)}" for n, value in fields.items() if value is not None
     )
 
 

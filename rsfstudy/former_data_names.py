@@ -25,7 +25,7 @@ _NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION = {
 }
 #: Former suffixes of the ends of confidence intervals, with their new suffixes, and the beginnings
 #: of the ``long_name`` that these variables had.
-_NEW_SUFFIX_BY_FORMER_SUFFIX = {"_low": "_ci_low", "_high": "_ci_high"}
+_NEW_INTERVAL_SUFFIX_BY_FORMER_SUFFIX = {"_low": "_ci_low", "_high": "_ci_high"}
 _FORMER_DESCRIPTIONS_OF_INTERVAL_ENDS = tuple(
     f"{end} end of the 95 % interval of the" for end in ("lower", "upper", "low", "high")
 )
@@ -35,7 +35,7 @@ _NEW_CLAIM_FIELD_BY_FORMER_FIELD = {
     "minus_variable": "baseline_variable",
     "because": "difference_reason",
 }
-_NEW_FIELDS_BY_REDUCTION_KIND = {
+_NEW_FIELD_NAMES_BY_REDUCTION_KIND = {
     "proportional_fit": {"minus": "intercept"},
     "spread": {"on": "over"},
 }
@@ -93,7 +93,7 @@ def _find_new_names_of_sobol_intervals(reductions: Any) -> dict[str, str]:
         f"{name}_{order}{former}": f"{name}_{order}{new}"
         for name in names
         for order in ("first_order", "total")
-        for former, new in _NEW_SUFFIX_BY_FORMER_SUFFIX.items()
+        for former, new in _NEW_INTERVAL_SUFFIX_BY_FORMER_SUFFIX.items()
     }
 
 
@@ -114,7 +114,7 @@ def _rename_reduction_fields(
     kind = reduction.get("kind")
     if not isinstance(kind, str):
         return dict(reduction)
-    new = _NEW_FIELDS_BY_REDUCTION_KIND.get(kind, {})
+    new = _NEW_FIELD_NAMES_BY_REDUCTION_KIND.get(kind, {})
     current = {new.get(key, key): value for key, value in reduction.items()}
     current["kind"] = _NEW_REDUCTION_KIND_BY_FORMER_KIND.get(kind, kind)
     return _rename_outputs_in_fields(current, ("of",), new_output_names)
@@ -168,7 +168,7 @@ def _find_current_variable_name(variable_name: str, description: str) -> str:
     for (former, beginning), new in _NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION.items():
         if variable_name == former and description.startswith(beginning):
             return new
-    for former, new in _NEW_SUFFIX_BY_FORMER_SUFFIX.items():
+    for former, new in _NEW_INTERVAL_SUFFIX_BY_FORMER_SUFFIX.items():
         if (
             variable_name.endswith(former)
             and not variable_name.endswith(new)
@@ -178,7 +178,7 @@ def _find_current_variable_name(variable_name: str, description: str) -> str:
     return variable_name
 
 
-class TableWithFormerColumns(pd.DataFrame):
+class TableAcceptingFormerColumnNames(pd.DataFrame):
     """Data frame whose columns can also be selected by their former names.
 
     A selection is an ordinary data frame with the requested names. A subclass defines

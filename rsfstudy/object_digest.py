@@ -24,10 +24,10 @@ from typing import Any, Self
 import numpy as np
 
 _TYPES_DIGESTED_BY_REPR = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
-_INSTRUCTIONS_READING_GLOBALS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")
+_OPCODES_READING_GLOBALS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")
 #: Types of objects, each with a function. The function returns the contents of a container, or the
 #: function inside a wrapper.
-_TYPES_AND_CONTENTS_GETTERS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
+_CONTENTS_GETTERS_BY_TYPE: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
     (property, lambda value: (value.fget, value.fset)),
     (functools.cached_property, lambda value: value.func),
     (functools.partial, lambda value: (value.func, value.args, value.keywords)),
@@ -101,7 +101,7 @@ class ObjectDigest:
             self._add_texts(f"{len(value)} together")
             for part in value:
                 self.add_object(part, used_names)
-        elif self._is_first_visit(id(value), value):
+        elif self._register_if_first_visit(id(value), value):
             self._add_unvisited_object(value, used_names)
         return self
 
@@ -109,7 +109,7 @@ class ObjectDigest:
         for text in texts:
             self._sha256.update(text.encode(errors="surrogatepass") + b"\0")
 
-    def _is_first_visit(self, key: Hashable, value: Any) -> bool:
+    def _register_if_first_visit(self, key: Hashable, value: Any) -> bool:
         """Return True for a new object; otherwise, add the number of its first visit."""
         if key in self._visited:
             self._add_texts(f"object {self._visited[key][0]}")
@@ -127,7 +127,7 @@ class ObjectDigest:
         elif type(value) is np.ndarray and value.dtype.kind != "O":
             self._add_texts(f"{value.dtype} {value.shape} {value.tobytes().hex()}")
         elif getter := next(
-            (get for kind, get in _TYPES_AND_CONTENTS_GETTERS if isinstance(value, kind)), None
+            (get for kind, get in _CONTENTS_GETTERS_BY_TYPE if isinstance(value, kind)), None
         ):
             self.add_object(getter(value), used_names)
         elif hasattr(value, "__wrapped__"):  # The value is a cached function.
@@ -140,7 +140,7 @@ class ObjectDigest:
         """Add the module members that the code uses to the digest."""
         if not self._reads_module(module.__name__):
             self._add_texts(module.__name__)
-        elif self._is_first_visit((id(module), *used_names), module):
+        elif self._register_if_first_visit((id(module), *used_names), module):
             used = [name for name in used_names if name in vars(module)]
             self.add_object(tuple(self._replace(vars(module)[name]) for name in used), used_names)
 
@@ -261,8 +261,6 @@ def list_global_names_read_by_code(code: CodeType) -> tuple[str, ...]:
     tuple of str
         Names of the globals without duplicates. Names of attributes are not included.
     """
-    reads = [
-        i.argval for i in dis.get_instructions(code) if i.opname in _INSTRUCTIONS_READING_GLOBALS
-    ]
+    reads = [i.argval for i in dis.get_instructions(code) if i.opname in _OPCODES_READING_GLOBALS]
     nested = (list_global_names_read_by_code(c) for c in code.co_consts if isinstance(c, CodeType))
     return tuple(dict.fromkeys((*reads, *(name for names in nested for name in names))))

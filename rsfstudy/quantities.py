@@ -196,7 +196,7 @@ def split_unit_quotient(unit_quotient: str) -> list[str]:
     return [each.removesuffix(")-1") for each in unit_quotient.split(" (")]
 
 
-def read_units_or_scale(attributes: Mapping[Any, Any]) -> str:
+def read_units_or_reference_scale(variable_attributes: Mapping[Any, Any]) -> str:
     """Return the units of a variable, or the scale of a normalised variable.
 
     Parameters
@@ -210,7 +210,10 @@ def read_units_or_scale(attributes: Mapping[Any, Any]) -> str:
         Units of the variable. If the variable has a scale, the scale replaces the units of the
         numerator.
     """
-    units, scale = str(attributes.get("units", "")), str(attributes.get("scale", ""))
+    units, scale = (
+        str(variable_attributes.get("units", "")),
+        str(variable_attributes.get("scale", "")),
+    )
     return format_unit_quotient([scale, *split_unit_quotient(units)[1:]]) if scale else units
 
 

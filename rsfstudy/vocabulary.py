@@ -19,7 +19,7 @@ from rsfstudy.quantities import Quantity
 from rsfstudy.slider import SceneFields
 
 
-def _read_vocabulary() -> Iterator[Quantity]:
+def _read_quantities_from_csv() -> Iterator[Quantity]:
     """Yield the quantities of the file ``vocabulary.csv``.
 
     The file does not list scene fields. The file lists quantities of scenes and rigs first, then
@@ -32,7 +32,7 @@ def _read_vocabulary() -> Iterator[Quantity]:
 
 
 QUANTITY_BY_NAME: dict[str, Quantity] = {
-    about.name: about for about in (*SceneFields.QUANTITIES, *_read_vocabulary())
+    about.name: about for about in (*SceneFields.QUANTITIES, *_read_quantities_from_csv())
 }
 
 _DESCRIPTION_BY_VARIABLE_SUFFIX = {

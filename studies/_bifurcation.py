@@ -28,7 +28,7 @@ from rsfstudy.limit_cycles.limit_cycle_search import (
     follow_motion_to_periodic_orbit,
 )
 from rsfstudy.limit_cycles.return_map import (
-    DIFFERENCE_STEP_OVER_LOG_RATE_RANGE,
+    FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE,
     PeriodicOrbit,
     ReturnMap,
     extract_section_coordinates,
@@ -307,7 +307,7 @@ def _mean_growth(by: ReturnMap, seen: Sequence[StickSlipCycle], kept: int) -> tu
     """
     seen = seen[-(kept + _ALIGNMENT_EVENTS) :]
     step = (
-        DIFFERENCE_STEP_OVER_LOG_RATE_RANGE
+        FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE
         * by.scene.a
         * max(cycle.log_slip_rate_range for cycle in seen)
     )

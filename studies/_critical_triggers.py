@@ -13,7 +13,7 @@ from rsfstudy import Scene
 from rsfstudy.critical_steps.stability_after_step import is_linearly_stable
 from rsfstudy.measures import CriticalStep, Measure, Outcome, Output, Status
 from rsfstudy.motion import Integrator
-from rsfstudy.slider import compute_effective_friction
+from rsfstudy.slider import compute_coulomb_effective_friction
 
 #: Triggers in the order of computation. The decrease of normal stress comes first, because a scene
 #: with constant normal stress rejects a step of normal stress.
@@ -238,7 +238,7 @@ def _trigger_stresses(
     dict
         Stress changes in sigma_*, ratios of stress changes, and errors of all values.
     """
-    friction = compute_effective_friction(scene.mu_star, scene.parts.law.b_over_a, alpha)
+    friction = compute_coulomb_effective_friction(scene.mu_star, scene.parts.law.b_over_a, alpha)
     pulled = _scale_with_error(
         scene.stiffness * (1.0 - friction * cot_phi), _DISPLACEMENT_STEP.primary_output, values
     )

@@ -21,7 +21,7 @@ from rsfstudy.measure_base import (
 )
 from rsfstudy.measure_base._recording_measure import VARIABLES_RECORDED_ALONG_PHASE
 from rsfstudy.measures import Outcome, Output, Status
-from rsfstudy.motion import Accuracy, Event, Integrator, Recording, resample_motion_along_path
+from rsfstudy.motion import Accuracy, Event, Integrator, MotionRecorder, resample_motion_along_path
 from rsfstudy.responses import compute_settled_friction_flag, estimate_errors_at_instants
 
 #: Fraction of the record over which friction must be constant. This part is the end of the record.
@@ -103,7 +103,7 @@ class _TransientRecord(NamedTuple):
     @property
     def final_friction(self) -> float:
         """Friction at the end of the record."""
-        return float(Recording.get_friction_coefficient(self.rows[-1:])[0])
+        return float(MotionRecorder.get_friction_coefficient(self.rows[-1:])[0])
 
     def remaining_transient(self, slip: float) -> float:
         """Return the remaining transient of friction at a slip.
@@ -285,15 +285,15 @@ class NormalStressTransient(RecordingMeasure):
             Record of the motion. The value is None if slip does not reach the values at which
             friction is read.
         """
-        recording = Recording()
+        recording = MotionRecorder()
         begin, *_others = integrator.follow(
             scene, with_time=True, recording=recording, until=self.record
         )
         rows = recording.as_table(scene)
-        slip = rows[:, Recording.MOTION_VARIABLE_NAMES.index("slip")]
+        slip = rows[:, MotionRecorder.MOTION_VARIABLE_NAMES.index("slip")]
         if slip.max() < max(self.fit_to, 1.0):
             return None
-        rate = rows[:, Recording.MOTION_VARIABLE_NAMES.index("log10_slip_rate")]
+        rate = rows[:, MotionRecorder.MOTION_VARIABLE_NAMES.index("log10_slip_rate")]
         taken_up = (
             abs(np.interp(self.fit_from, slip, rate)) * math.log(10.0) <= _SPRING_RESPONSE_LOG_RATE
         )
@@ -317,7 +317,9 @@ class NormalStressTransient(RecordingMeasure):
             wait = (
                 float(
                     np.interp(
-                        slip, rows[:, Recording.MOTION_VARIABLE_NAMES.index("slip")], rows[:, 0]
+                        slip,
+                        rows[:, MotionRecorder.MOTION_VARIABLE_NAMES.index("slip")],
+                        rows[:, 0],
                     )
                 )
                 - elapsed
@@ -392,16 +394,18 @@ class NormalStressTransient(RecordingMeasure):
         self, scene: Scene, record: _TransientRecord
     ) -> dict[str, float | np.ndarray]:
         """Return the recorded variables, and the results that need no exponential fit."""
-        rows, friction = record.rows, Recording.get_friction_coefficient(record.rows)
+        rows, friction = record.rows, MotionRecorder.get_friction_coefficient(record.rows)
         late = rows[:, 0] >= (1.0 - _FINAL_SHARE) * self.record
         is_flat = bool(
             np.ptp(friction[late])
             < _FINAL_FRICTION_RTOL * abs(record.remaining_transient(self.fit_from))
         )
-        path = resample_motion_along_path(rows, self.phases, Recording.VARIABLE_NAMES)
+        path = resample_motion_along_path(rows, self.phases, MotionRecorder.VARIABLE_NAMES)
         return {
             "direct_change": _direct_change(scene, record),
-            "settled": compute_settled_friction_flag(scene.segment_scene(-1), is_flat=is_flat),
+            "settled": compute_settled_friction_flag(
+                scene.segment_scene(-1), is_friction_constant=is_flat
+            ),
             "closed_form_departure": self._departure_from_rigid(scene, record),
             "time": path["time"],
             "load_point_displacement": path["time"],
@@ -433,13 +437,13 @@ class NormalStressTransient(RecordingMeasure):
         law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
         if law.relaxation is None or law.depends_on_stress or coupling is None:
             return math.nan
-        slip = record.rows[:, Recording.MOTION_VARIABLE_NAMES.index("slip")]
+        slip = record.rows[:, MotionRecorder.MOTION_VARIABLE_NAMES.index("slip")]
         read = slip >= self.fit_from
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         # If b is zero, alpha is zero too, and friction does not evolve.
         away = -coupling[1] / scene.b * math.log(ratio) if scene.b else 0.0
         left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
-        seen = Recording.get_friction_coefficient(record.rows[read]) - scene.mu_star
+        seen = MotionRecorder.get_friction_coefficient(record.rows[read]) - scene.mu_star
         return float(np.abs(seen - scene.b * left).max())
 
 

@@ -299,7 +299,7 @@ class SyntheticFit(Measure):
             naive = FitProblem(
                 search.model, found.parameter_values, self._free_parameters, "white"
             ).solve()
-        exact = search.parameter_values_to_fit_coordinates(true)
+        exact = search.compute_fit_coordinates(true)
         profiles = [LikelihoodProfile(search, found, name) for name in self._free_parameters]
         # Noise of the load point displacement widens the intervals in proportion.
         wider = np.array(
@@ -312,12 +312,12 @@ class SyntheticFit(Measure):
         each = zip(profiles, nearer.tolist(), strict=True)
         squared = [one.compute_twice_log_likelihood_decrease(x) for one, x in each]
         naively = np.square(
-            (search.parameter_values_to_fit_coordinates(naive.parameter_values) - exact)
+            (search.compute_fit_coordinates(naive.parameter_values) - exact)
             / naive.fit_coordinate_stderr
         )
         by_parameter = {
-            "estimate": search.parameter_values_to_fit_coordinates(found.parameter_values),
-            "deviation": search.parameter_values_to_fit_coordinates(found.parameter_values) - exact,
+            "estimate": search.compute_fit_coordinates(found.parameter_values),
+            "deviation": search.compute_fit_coordinates(found.parameter_values) - exact,
             "deviation_error": np.array(
                 [found.parameter_numerical_errors[n] for n in self._free_parameters]
             )

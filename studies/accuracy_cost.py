@@ -33,7 +33,11 @@ from rsfstudy.measures import (
 from rsfstudy.motion import Engine, Integrator, WorkMeter
 from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
 from rsfstudy.reductions import LinearFit
-from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line, reference_line
+from rsfstudy.study.figure_declarations import (
+    MatplotlibAxes,
+    build_horizontal_line_overlay,
+    build_reference_line_overlay,
+)
 
 from . import _reference_values as known
 from ._cheapest_integrator import CheapestIntegrator
@@ -333,7 +337,7 @@ def plot_unreachable_accuracy(dataset: xr.Dataset, axes: MatplotlibAxes) -> None
     from rsfstudy.plots import cycle_style
 
     floor = max(float(dataset["measured_error_error"].max()), 1e-16)
-    horizontal_line(floor, linestyle=":")(dataset, axes)
+    build_horizontal_line_overlay(floor, linestyle=":")(dataset, axes)
     for number in range(dataset.sizes["integrator"]):
         runs = dataset.isel(integrator=number)
         work = runs["run_evaluations"].where(runs["status"] == Status.ACCURACY_OUT_OF_REACH)
@@ -365,7 +369,11 @@ figure = Figure(
                     DEFAULT_INTEGRATOR if DEFAULT_INTEGRATOR in names else names[0]
                 )
             },
-            overlays=[reference_line("requested_digits", lambda x: x, "as asked", linewidth=0.9)],
+            overlays=[
+                build_reference_line_overlay(
+                    "requested_digits", lambda x: x, "as asked", linewidth=0.9
+                )
+            ],
             x_label="Requested digits",
             y_label="Correct digits",
             legend_columns=1,

@@ -18,7 +18,10 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reductions import ClosedFormRatio, ProportionalFit, RelativeDifference
-from rsfstudy.study.figure_declarations import horizontal_line, reference_line
+from rsfstudy.study.figure_declarations import (
+    build_horizontal_line_overlay,
+    build_reference_line_overlay,
+)
 
 from ._paper import (
     CONSTANT_NORMAL_STRESS,
@@ -105,7 +108,9 @@ figure = Figure(
             markers_only=True,
             style=marker_style,
             overlays=[
-                reference_line(ABSCISSA, lambda x: x, r"$D_c\,a/(b-a)$ (Gu et al. 1984)", 0.0)
+                build_reference_line_overlay(
+                    ABSCISSA, lambda x: x, r"$D_c\,a/(b-a)$ (Gu et al. 1984)", 0.0
+                )
             ],
             x_limits=(0.0, None),
             y_limits=(0.0, None),
@@ -116,7 +121,7 @@ figure = Figure(
             hue=["case", "stiffness_ratio"],
             facet=["law", "load"],
             style={"markersize": 2.5, "linewidth": 0.9},
-            overlays=[horizontal_line(1.0)],
+            overlays=[build_horizontal_line_overlay(1.0)],
             y_label=r"Critical $\Delta\delta_0/D_c$ over $a/(b-a)$",
         ),
     ]

@@ -22,17 +22,17 @@ from scipy.optimize import brentq
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study, history
 from rsfstudy.measures import Measure, Outcome, Output, Status
-from rsfstudy.motion import Integrator, Recording
+from rsfstudy.motion import Integrator, MotionRecorder
 from rsfstudy.slider import SampledHistory
 from rsfstudy.slider.sampled_loading import TIME_COLUMN
-from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, build_horizontal_line_overlay
 
 #: Initial perturbation of spring stress relative to ``a``. The second value is the sampling
 #: interval in D_c/V_*. The third value is the half-width of the window around an extremum, as a
 #: fraction of the length of the record.
 INITIAL_DEPARTURE, SAMPLING_INTERVAL, EXTREMUM_WINDOW = 1e-5, 0.25, 1.0 / 16.0
 
-LOG_SLIP_RATE_COLUMN = Recording.MOTION_VARIABLE_NAMES.index("log10_slip_rate")
+LOG_SLIP_RATE_COLUMN = MotionRecorder.MOTION_VARIABLE_NAMES.index("log10_slip_rate")
 GROWTH_ENDS, GROWTH_BEGINS = "end", "begin"
 _GROWTH_DESCRIPTIONS = {
     GROWTH_ENDS: "stop growing as pressure increases",
@@ -213,7 +213,7 @@ class _Departures(NamedTuple):
         tables = []
         for departure in (0.0, INITIAL_DEPARTURE * scene.a):
             beside = scene.with_(initial_stress=scene.initial_stress + departure)
-            recording = Recording(sample_times=time)
+            recording = MotionRecorder(sample_times=time)
             for _event in integrator.follow(beside, recording=recording, until=float(time[-1])):
                 pass
             tables.append(recording.as_table(beside))
@@ -459,9 +459,9 @@ def plot_critical_pressure(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     scenes = (base.with_(**CASES[_case_name(1.0)] | {"drainage": c}) for c in drainages.tolist())
     found = [_critical_pressure(scene) for scene in scenes]
     axes.plot(drainages, found, color="0.3", linewidth=0.8, label="k critical at $V_0$")
-    horizontal_line(_critical_pressure(base), color="0.3", linestyle=":", label="drained")(
-        dataset, axes
-    )
+    build_horizontal_line_overlay(
+        _critical_pressure(base), color="0.3", linestyle=":", label="drained"
+    )(dataset, axes)
 
 
 def pressure_rates(row: xr.Dataset) -> xr.DataArray:

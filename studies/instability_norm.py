@@ -16,7 +16,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reductions import Inverse
-from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, build_horizontal_line_overlay
 
 from ._paper import PAPER, REFERENCE
 
@@ -121,7 +121,7 @@ figure = Figure(
             y=lambda row: select_law(
                 "slip", (row["critical_velocity_ratio"] - 1.0) * (row["b_over_a"] - 1.0)
             ),
-            overlays=[plot_norm, horizontal_line(1.0)],
+            overlays=[plot_norm, build_horizontal_line_overlay(1.0)],
             title="Slip law, $k = k_{cr}$",
             y_label=r"$(V_0/V_* - 1)\,(b-a)/a$",
         ),

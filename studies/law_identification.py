@@ -19,7 +19,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.reductions import Reduction
 from rsfstudy.study.figure_declarations import MatplotlibAxes
-from rsfstudy.study.reductions.base import DerivativesWithCellCoordinates
+from rsfstudy.study.reductions.base import DerivativesAndCellCoordinates
 
 from ._synthetic_fit import (
     BASE_SCENE,
@@ -88,7 +88,7 @@ class ScatterRatio(Reduction):
         off = (found - 1.0) * math.sqrt(2.0 * self._record_dimensions(dataset))
         return xr.Dataset({self.name: found, f"{self.name}_off": off})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Return the derivatives of the ratio with respect to the deviations.
 
         Parameters

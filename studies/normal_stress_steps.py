@@ -17,7 +17,7 @@ import xarray as xr
 from scipy.integrate import quad
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, build_horizontal_line_overlay
 
 from ._normal_stress_transient import NormalStressTransient
 from ._phase_plane import scene_from_coordinates
@@ -258,7 +258,7 @@ readings_panel = Panel(
     x="stiffness_ratio",
     hue=["normal_stress_step", "law"],
     style={"linewidth": 0.9},
-    overlays=[horizontal_line(1.0)],
+    overlays=[build_horizontal_line_overlay(1.0)],
     log="x",
 )
 figure = Figure(

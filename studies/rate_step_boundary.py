@@ -14,7 +14,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reductions import ProportionalFit, RelativeDifference
-from rsfstudy.study.figure_declarations import MatplotlibAxes, reference_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, build_reference_line_overlay
 
 from ._paper import (
     CONSTANT_NORMAL_STRESS,
@@ -74,7 +74,7 @@ figure = Figure(
             fit_line=fit_line,
             annotation="zeta",
             overlays=[
-                reference_line(
+                build_reference_line_overlay(
                     "a_over_b_minus_a", lambda x: 1.0 + x, "$1 + a/(b-a)$ (Gu et al. 1984)", 0.0
                 ),
                 plot_fitted_range,

@@ -17,7 +17,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reductions import ClosedFormRatio, RelativeDifference
-from rsfstudy.study.figure_declarations import MatplotlibAxes, reference_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, build_reference_line_overlay
 
 from ._paper import (
     CONSTANT_NORMAL_STRESS,
@@ -116,7 +116,9 @@ def plot_eq_11(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     """
     weakening, text = float(dataset["b_over_a"]) - 1.0, r"$\exp(k/k_{cr})/\lambda$ (eq. 11)"
     if dataset["law"] == "slip":
-        reference_line("stiffness_ratio", lambda x: np.exp(x) / weakening, text)(dataset, axes)
+        build_reference_line_overlay("stiffness_ratio", lambda x: np.exp(x) / weakening, text)(
+            dataset, axes
+        )
 
 
 boundary_panel = Panel(x="stiffness_ratio", y="critical_velocity_ratio", hue=["case"])

@@ -18,7 +18,7 @@ import xarray as xr
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.reductions import Inverse
 from rsfstudy.slider.stability import compute_spring_response_to_normal_stress
-from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, build_horizontal_line_overlay
 
 from ._normal_stress_response import NormalStressResponse
 from ._phase_plane import scene_from_coordinates
@@ -300,9 +300,9 @@ def plot_linear_theory(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
 
     for number in range(dataset.sizes["stiffness_ratio"]):
         gain = float(dataset["linear_gain"].isel(stiffness_ratio=number).max())
-        horizontal_line(gain, color=cycle_style(number)["color"], linewidth=0.6, linestyle=":")(
-            dataset, axes
-        )
+        build_horizontal_line_overlay(
+            gain, color=cycle_style(number)["color"], linewidth=0.6, linestyle=":"
+        )(dataset, axes)
 
 
 def closest_to_resonance(periods: list[float]) -> float:
@@ -361,7 +361,7 @@ figure = Figure(
         replace(
             large_amplitude_panel,
             y=partial(settled_values, "departure_from_linear"),
-            overlays=[horizontal_line(MAX_LINEAR_DEVIATION)],
+            overlays=[build_horizontal_line_overlay(MAX_LINEAR_DEVIATION)],
             y_label="Relative difference from linear theory",
         ),
     ],

@@ -14,7 +14,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import RigidResponse
 from rsfstudy.reductions import Range, RelativeDifference
-from rsfstudy.study.figure_declarations import horizontal_line
+from rsfstudy.study.figure_declarations import build_horizontal_line_overlay
 
 from ._paper import PAPER, REFERENCE
 
@@ -120,7 +120,7 @@ figure = Figure(
             facet=["law", "normal_stress"],
             style=curve_style,
             curve_label=lambda row: f"$10^{{{step_in_decades(row)}}}$",
-            overlays=[horizontal_line(0.0)],
+            overlays=[build_horizontal_line_overlay(0.0)],
             y_label=r"Remaining stress, $(\tau - \tau_{ss})/(a\,\sigma_*)$",
             legend_columns=4,
             legend_title="Slip rate after the step, $V(0^+)/V_*$",

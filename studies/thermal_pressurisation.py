@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import LinearStability
-from rsfstudy.study.figure_declarations import horizontal_line
+from rsfstudy.study.figure_declarations import build_horizontal_line_overlay
 
 from ._heat import PRESSURE_REFERENCES, PRESSURISED_FAULT, closest_to, known_value_claim
 
@@ -96,7 +96,9 @@ panel = Panel(
     isel={"cooling": closest_to(0.01)},
     fit_line=closed_form,
     curve_label=lambda row: f"$E = {float(row['heating']):g}$",
-    overlays=[horizontal_line(_B - _A, color="0.75", linewidth=2.0, label="drained, $b-a$")],
+    overlays=[
+        build_horizontal_line_overlay(_B - _A, color="0.75", linewidth=2.0, label="drained, $b-a$")
+    ],
     style={"markersize": 2.5},
     x_label="Drainage rate, $c^*D_c/V_*$",
     y_label=r"Critical stiffness, $k_{cr}D_c/\sigma_*$",

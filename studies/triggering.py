@@ -34,10 +34,14 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.reductions import LinearFit
-from rsfstudy.slider import compute_effective_friction
+from rsfstudy.slider import compute_coulomb_effective_friction
 from rsfstudy.slider.closed_forms import compute_critical_normal_stress_step
 from rsfstudy.study import DrawFunction
-from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line, reference_line
+from rsfstudy.study.figure_declarations import (
+    MatplotlibAxes,
+    build_horizontal_line_overlay,
+    build_reference_line_overlay,
+)
 
 from ._critical_triggers import Triggers
 from ._paper import GU_ET_AL, REFERENCE
@@ -58,7 +62,7 @@ HELD_LOAD_POINT_SOURCE = (
 )
 
 #: Effective friction mu' for alpha = 0.56 and b/a = 2.
-EFFECTIVE_FRICTION = compute_effective_friction(base.mu_star, base.b_over_a, 0.56)
+EFFECTIVE_FRICTION = compute_coulomb_effective_friction(base.mu_star, base.b_over_a, 0.56)
 FRICTION_REDUCTION = base.mu_star - EFFECTIVE_FRICTION
 
 
@@ -245,7 +249,9 @@ figure = Figure(
             panel,
             y=lambda row: row[NORMAL_STRESS_FALL] / row["a"],
             overlays=[
-                reference_line(ABSCISSA, lambda x: x, "Coulomb, first order, imposed"),
+                build_reference_line_overlay(
+                    ABSCISSA, lambda x: x, "Coulomb, first order, imposed"
+                ),
                 draw_comparison(
                     DISPLACEMENT_STEP, "displacement step", CONTINUOUS_LINE_STYLE, over="a"
                 ),
@@ -261,7 +267,7 @@ figure = Figure(
             panel,
             y="coulomb_ratio",
             overlays=[
-                horizontal_line(1.0, color="0.82", linewidth=2.5),
+                build_horizontal_line_overlay(1.0, color="0.82", linewidth=2.5),
                 draw_comparison("direct_ratio", VELOCITY_STEP_LABEL, DISPLACEMENT_STEP_STYLE),
             ],
             y_label="Stress change divided by that of a displacement step",

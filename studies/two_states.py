@@ -19,7 +19,7 @@ from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import Status
 from rsfstudy.reductions import Boundary, Inverse
 from rsfstudy.study import DrawFunction
-from rsfstudy.study.figure_declarations import MatplotlibAxes, horizontal_line
+from rsfstudy.study.figure_declarations import MatplotlibAxes, build_horizontal_line_overlay
 
 from ._bifurcation import Bifurcation
 
@@ -197,7 +197,12 @@ multipliers_panel = replace(
     peaks_panel,
     y_label=r"$\Lambda_1$ of the cycle of one event; $\lambda$",
     title="Multipliers: the cycle is unstable below $-1$",
-    overlays=[plot_multipliers, horizontal_line(-1.0), horizontal_line(1.0), set_abscissa(False)],
+    overlays=[
+        plot_multipliers,
+        build_horizontal_line_overlay(-1.0),
+        build_horizontal_line_overlay(1.0),
+        set_abscissa(False),
+    ],
 )
 figure = Figure(
     [

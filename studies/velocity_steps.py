@@ -19,7 +19,7 @@ from scipy.integrate import quad
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import VelocityStep
 from rsfstudy.reductions import ClosedFormRatio
-from rsfstudy.study.figure_declarations import horizontal_line
+from rsfstudy.study.figure_declarations import build_horizontal_line_overlay
 
 #: Ratios of stiffness to critical stiffness, from compliant to stiff machines.
 STIFFNESS_RATIOS = [1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 300.0]
@@ -245,7 +245,7 @@ def reading_panel(
         y=lambda row: row[name] / math.prod(float(row[factor]) for factor in over),
         hue=["velocity_ratio", "law"],
         style={"linewidth": 0.9},
-        overlays=[horizontal_line(1.0)],
+        overlays=[build_horizontal_line_overlay(1.0)],
         title=title,
         y_label=label,
         log="x",

@@ -17,7 +17,7 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.study.figure_declarations import horizontal_line
+from rsfstudy.study.figure_declarations import build_horizontal_line_overlay
 
 from ._clock_advance import LINEARISED_LAWS, ClockAdvance
 
@@ -293,7 +293,7 @@ figure = Figure(
             facet=["law", "oscillation_period"],
             fit_line=theory_line,
             markers_only=True,
-            overlays=[horizontal_line(0.0, color="0.82")],
+            overlays=[build_horizontal_line_overlay(0.0, color="0.82")],
             x_label="Beginning of the train, in intervals",
             y_label=r"Clock advance divided by amplitude ($D_c/V_*$)",
             legend_title="Lines: linearised equations, and a Coulomb stress threshold for the "

@@ -28,7 +28,7 @@ from rsfstudy.motion.events import (
     rise,
 )
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.motion.recording import MOTION_VARIABLE_NAMES, Recording
+from rsfstudy.motion.recording import MOTION_VARIABLE_NAMES, MotionRecorder
 from rsfstudy.slider.equations import (
     build_equations_at_imposed_slip_rate,
     build_equations_between_ruptures,
@@ -147,7 +147,7 @@ class Track(NamedTuple):
 
         Only a rigid slider with one state variable is supported.
         """
-        recording, events = Recording(sample_times=np.array(self.samples)), []
+        recording, events = MotionRecorder(sample_times=np.array(self.samples)), []
         for event in follow(recording=recording):
             if event.kind is EventKind.ALL_SAMPLES_RECORDED:
                 break

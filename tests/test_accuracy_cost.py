@@ -21,7 +21,7 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.motion.recording import Recording
+from rsfstudy.motion.recording import MotionRecorder
 from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.responses.step_response import StepResponse
@@ -54,7 +54,7 @@ def test_every_right_hand_side_is_counted(method, monkeypatch):
     integrator = Integrator(Accuracy(budget=10**6, methods=(("quasi_static", method),)))
     # The recording needs interpolants within each step.
     path = integrator.follow_equations(
-        counted, (0.0, 0.0), [STEP_END_EVENT], local_tolerance=1e-6, recording=Recording()
+        counted, (0.0, 0.0), [STEP_END_EVENT], local_tolerance=1e-6, recording=MotionRecorder()
     )
     told = list(itertools.islice(path, 22))
     assert integrator.evaluations == told[-1].evaluation_count == len(calls)

@@ -333,7 +333,9 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
         (tmp_path / name / "slider" / "law.py").write_text(text)
     assert old in LAW
     before, after = (
-        ModuleImportGraph(provenance.read_physics_source_files(tmp_path / name)).compute_digests()
+        ModuleImportGraph(
+            provenance.read_source_files_affecting_results(tmp_path / name)
+        ).compute_digests()
         for name in ("before", "after")
     )
     assert before.keys() == {"slider.law"}
@@ -342,7 +344,7 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
 
 def test_the_digest_of_the_physics_is_that_of_its_files():
     package = Path(rsfstudy.__file__).parent
-    files = provenance.read_physics_source_files(package)
+    files = provenance.read_source_files_affecting_results(package)
     assert {"slider/friction.py", "motion/motion_loop.py", "measure_base/measure.py"} <= set(files)
     moved = {**files, "slider/moved.py": files["slider/friction.py"]}
     digests = [ModuleImportGraph(each).combined_digest for each in (files, moved)]
@@ -353,13 +355,16 @@ def test_the_digest_of_the_physics_is_that_of_its_files():
 def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     """The digest is the same before and after the use of a study."""
     study = study_loader.load_study(name)
-    fresh = code_digest.digest_measures_of_named_studies(study.measure.code_classes)
+    fresh = code_digest.digest_measures_of_named_studies(study.measure.result_determining_classes)
     values = [
         value
-        for kind in study.measure.code_classes
+        for kind in study.measure.result_determining_classes
         for value in vars(sys.modules[kind.__module__]).values()
     ]
     values += [part for value in values if isinstance(value, dict) for part in value.values()]
     used = [value.variables for value in values if isinstance(value, measures.Measure)]
     assert used
-    assert code_digest.digest_measures_of_named_studies(study.measure.code_classes) == fresh
+    assert (
+        code_digest.digest_measures_of_named_studies(study.measure.result_determining_classes)
+        == fresh
+    )

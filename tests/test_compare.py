@@ -52,8 +52,8 @@ def test_the_same_agree(two):
     assert found.finished_cell_counts == (8, 0, 0)
     assert (found.agreement_table["values"] == found.agreement_table["identical"]).all()
     assert (
-        found.declaration,
-        found.origin,
+        found.differing_declaration_entries,
+        found.differing_provenance,
         found.differing_axis_points,
         found.uncompared_variables,
     ) == ({}, {}, {}, {})
@@ -75,7 +75,7 @@ def test_statuses_that_differ_are_named(two):
     two[1]["status"][1, 0] = int(Status.NO_STEADY_STATE)
     found = rsfstudy.compare(*two)
     assert not found.agrees
-    (ended,) = found.statuses.to_dict("records")
+    (ended,) = found.differing_statuses.to_dict("records")
     assert ended == {
         "law": "slowness",
         "b_over_a": 1.5,
@@ -91,7 +91,7 @@ def test_codes_are_compared_though_they_have_no_errors(two):
         dataset["mode"] = dataset[NUMBER].copy(data=dataset[NUMBER].values * 0.0 + code)
         dataset["mode"].attrs = codes
     assert rsfstudy.compare(first, first).agrees
-    assert rsfstudy.compare(first, second).beyond_errors == ["mode"]
+    assert rsfstudy.compare(first, second).variables_beyond_errors == ["mode"]
 
 
 def test_points_of_one_name_must_hold_the_same(two):
@@ -157,8 +157,8 @@ def test_declaration_and_origin(two):
     declared["accuracy"]["rtol"] = 1e-5
     changed = {"provenance": json.dumps(about), "declaration": json.dumps(declared)}
     found = rsfstudy.compare(first, second.assign_attrs(changed))
-    assert found.declaration == {"accuracy.rtol": (1e-7, 1e-5)}
-    assert found.origin["machine"][1] == "an abacus"
+    assert found.differing_declaration_entries == {"accuracy.rtol": (1e-7, 1e-5)}
+    assert found.differing_provenance["machine"][1] == "an abacus"
     assert found.agrees
 
 

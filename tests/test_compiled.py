@@ -81,7 +81,7 @@ class Tabulated(Law):
 def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
     line = tabulated.__code__.co_firstlineno + 1
     with pytest.raises(InvalidValue, match=rf"the part .*tabulated.*test_compiled.py, line {line}"):
-        numba_backend.compile_equations_of_scene(Scene(law=Tabulated), with_time=True)
+        numba_backend.compile_equations_of_scene(Scene(law=Tabulated), include_time_equation=True)
     assert (
         simulate(Scene(law=Tabulated, stiffness=0.01, hold_time=1.0), duration=1.0).attrs["status"]
         == "ok"
@@ -160,7 +160,7 @@ def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
     scene = CellPlan(study).example_scenes[0]
     monkeypatch.setattr(numba_backend, "get_compiled_function_addresses", asked)
     for clock in study.measure.needs_time:
-        numba_backend.compile_equations_of_scene(scene, with_time=clock)
+        numba_backend.compile_equations_of_scene(scene, include_time_equation=clock)
     prepared = set(wanted)
     wanted.clear()
     study.measure(scene, study.accuracy)
@@ -289,7 +289,7 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     function, state = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4), (0.01, 0.02)
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
-        compile_cache._jit_compile_callee_once.cache_clear()
+        compile_cache._jit_compile_callee_cached.cache_clear()
         monkeypatch.setattr(numba_backend, "_COMPILED_ADDRESSES_BY_FUNCTIONS", {})
         equations = build_equations_between_ruptures(
             Scene(law=law, normal_stress="constant"), with_time=False

@@ -18,7 +18,7 @@ from rsfstudy.motion.events import EventKind, rise
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.regime_switching import (
     CONTINUES,
-    compute_margin_to_termination,
+    compute_margin_to_motion_termination,
     find_termination_status,
 )
 from rsfstudy.motion.work_meter import MotionStopped
@@ -33,7 +33,7 @@ def test_a_margin_is_left_where_a_motion_goes_on():
         for x in rates:
             for stress in stresses:
                 goes_on = find_termination_status(x, stress, load) == CONTINUES
-                assert (compute_margin_to_termination(x, stress, load) > 1e-12) == goes_on, (
+                assert (compute_margin_to_motion_termination(x, stress, load) > 1e-12) == goes_on, (
                     x,
                     stress,
                     load,

@@ -193,7 +193,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         ),
         (lambda r: PowerLaw("z", of="x", on="y").centre_values(ARRAY, "y"), "has no dimension 'y'"),
         (
-            lambda r: reductions.Difference("z", of="x", along="y").support_status(ARRAY),
+            lambda r: reductions.Difference("z", of="x", along="y").get_status_of_used_cells(ARRAY),
             "no dimension 'y'",
         ),
         (

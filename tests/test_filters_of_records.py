@@ -29,7 +29,9 @@ def filtered(text: str, size: float, seed: int) -> rsfstudy.Record:
     friction += size * np.random.default_rng(seed).standard_normal(len(fine))
     passed = Filter.parse(text)
     if passed is not None:
-        friction = passed.apply(fine, np.interp(passed.sample_times(fine), fine, friction))
+        friction = passed.apply(
+            fine, np.interp(passed.compute_required_sample_times(fine), fine, friction)
+        )
     rows = slice(100, -100, 5)
     columns = {"time": fine[rows], "friction": friction[rows]}
     moved = synthetic.load_point_displacement(LOADING, fine[rows])
@@ -45,7 +47,7 @@ def test_filters_of_an_exponential_are_exact(kind: str) -> None:
     """
     time, size = np.arange(5.0, 20.0, 0.05), 0.8
     one = Filter(kind, size)
-    at = one.sample_times(time)
+    at = one.compute_required_sample_times(time)
     found = one.apply(time, np.where(at > 10.0, np.exp(10.0 - np.maximum(at, 10.0)), 1.0))
     if kind not in LOW_PASS_ORDERS:
         late = time + (0.5 * size if kind == "mean" else 0.0)

@@ -21,7 +21,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINE_NAMES
 from rsfstudy.motion.events import EventKind, maximum
 from rsfstudy.motion.integrator import Integrator
-from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, Recording
+from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, MotionRecorder
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
@@ -224,7 +224,7 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage, dilatancy,
     )
     r = 1.0 / length
     x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
-    recording = Recording(sample_times=np.array([0.1, 0.7, 2.0, 5.0]))
+    recording = MotionRecorder(sample_times=np.array([0.1, 0.7, 2.0, 5.0]))
     equations = build_equations_at_imposed_slip_rate(scene, x)
     path = Integrator(Accuracy()).follow_equations(
         equations, (start, 0.0, 0.0), local_tolerance=1e-11, recording=recording

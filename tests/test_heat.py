@@ -612,7 +612,9 @@ def test_the_temperature_stays_within_its_bounds():
     fastest = 10.0 ** motion["log10_slip_rate"].values.max()
     power, temperature = float(stress.max() * fastest), scene.parts.temperature
     for start in (0, len(rises) // 2):
-        lowest, highest = temperature.rise_bounds(scene, float(rises[start]), power)
+        lowest, highest = temperature.compute_temperature_rise_bounds(
+            scene, float(rises[start]), power
+        )
         assert lowest <= rises[start:].min()
         assert rises[start:].max() <= highest
     assert rises.max() > 0.0 > rises.min()

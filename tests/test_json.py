@@ -240,7 +240,7 @@ def test_check_of_all_studies(place, tmp_path):
     files = [str(place / folder / "slopes.nc") for folder in ("out", "other")]
     several = [study_results.StudyResults(rsfstudy.open(file), file) for file in files]
     verdicts = study_results.collect_verdicts(several)
-    claims = study_results.verdicts_to_json(verdicts)
+    claims = study_results.convert_verdicts_to_json(verdicts)
     assert [claim["study"] for claim in claims] == ["slopes", "slopes"]
     assert [claim["verdict"] for claim in claims] == ["reproduced", "not applicable"]
     assert set(claims[0]) == set(documented_keys("Verdict on a claim"))
@@ -418,8 +418,12 @@ def test_wrong_usage_prints_no_object(words):
 def test_values_without_a_json_form():
     given = {1: math.nan, "b": np.array([1.0, np.inf]), "c": np.int8(3), "d": Path("x/y"), "e": ()}
     expected = {"1": None, "b": [1.0, None], "c": 3, "d": str(Path("x/y")), "e": []}
-    assert command_results.to_json_value(given) == expected
-    assert command_results.to_json_value([True, None, np.bool_(False)]) == [True, None, False]
+    assert command_results.convert_to_json_value(given) == expected
+    assert command_results.convert_to_json_value([True, None, np.bool_(False)]) == [
+        True,
+        None,
+        False,
+    ]
 
 
 def test_the_example_of_the_page_runs(tmp_path):

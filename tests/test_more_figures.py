@@ -115,7 +115,7 @@ def test_a_legend_beside_a_scale_of_colours_leaves_the_panel_its_room():
     ]
     dataset = run(Study(name="n", title="", base=Scene(), axes=axes, measure=LinearStability()))
     drawn = plots.draw_figure(
-        dataset, rsfstudy.Figure(lines.build_panels_of_figure(dataset, "critical_stiffness"))
+        dataset, rsfstudy.Figure(lines.build_line_panels(dataset, "critical_stiffness"))
     )
     assert drawn.axes[0].get_position().width > 0.55
 

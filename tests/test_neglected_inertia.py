@@ -10,7 +10,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
-from rsfstudy.motion.recording import REGIME_COLUMN, Recording
+from rsfstudy.motion.recording import REGIME_COLUMN, MotionRecorder
 from rsfstudy.responses._motion_quantities import compute_growth_rate_along_path
 from rsfstudy.responses.healing import Healing
 from rsfstudy.responses.velocity_step import VelocityStep
@@ -69,7 +69,7 @@ def test_errors_cover_what_both_runs_neglect(measure, rtol, scene):
 
 
 def recorded(scene, rtol):
-    recording, accuracy = Recording(), Accuracy(rtol, 10_000_000, engine="compiled")
+    recording, accuracy = MotionRecorder(), Accuracy(rtol, 10_000_000, engine="compiled")
     list(Integrator(accuracy).follow(scene, with_time=True,
                 recording=recording, until=12.0))  # fmt: skip
     return recording, recording.as_table(scene)
@@ -78,7 +78,7 @@ def recorded(scene, rtol):
 def test_a_scene_without_inertia_neglects_none():
     scene = Scene(law="slip", stiffness_ratio=2.0, load_velocity_ratio=3.0)
     recording, rows = recorded(scene, 1e-6)
-    slow = recording.get_or_add_regime_index(scene.dynamics.regime)
+    slow = recording.get_or_add_regime_index(scene.dynamics.regime_name)
     assert not estimate_neglected_inertia_error(scene, rows, slow, 0.0).any()
 
 

@@ -17,9 +17,9 @@ from rsfstudy.fitting import noise as noises
 from rsfstudy.fitting.noise import NoiseModel
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
 from rsfstudy.fitting.uniform_sampling_runs import (
-    SamplingRun,
+    UniformSamplingRun,
     find_noise_level_changes,
-    find_sampling_runs,
+    find_uniform_sampling_runs,
 )
 
 #: Coefficients of a third-order autoregressive process with a pair of complex roots.
@@ -47,20 +47,20 @@ def partial(coefficients: np.ndarray) -> np.ndarray:
 
 #: Runs of two processes. The length of one run is less than the order.
 RUNS = (
-    SamplingRun(0, 40, 0, 0, 0),
-    SamplingRun(40, 42, 1, 0, 1),
-    SamplingRun(42, 90, 0, 0, 0),
-    SamplingRun(90, 130, 1, 0, 1),
+    UniformSamplingRun(0, 40, 0, 0, 0),
+    UniformSamplingRun(40, 42, 1, 0, 1),
+    UniformSamplingRun(42, 90, 0, 0, 0),
+    UniformSamplingRun(90, 130, 1, 0, 1),
 )
 SIZES = [1.0, 0.3]
 BOTH = NoiseModel(RUNS, np.array([partial(AR3), [0.9, 0.0, 0.0]]), np.array(SIZES))
 #: Runs of a single process with a variable noise level. The level first changes after fewer rows
 #: than the order.
 JOINED = (
-    SamplingRun(0, 2, 0, 0, 0),
-    SamplingRun(2, 42, 1, 2, 1),
-    SamplingRun(42, 90, 0, 42, 0),
-    SamplingRun(90, 130, 1, 90, 1),
+    UniformSamplingRun(0, 2, 0, 0, 0),
+    UniformSamplingRun(2, 42, 1, 2, 1),
+    UniformSamplingRun(42, 90, 0, 42, 0),
+    UniformSamplingRun(90, 130, 1, 90, 1),
 )
 CHANGING = NoiseModel(JOINED, np.array([partial(AR3)] * 2), np.array(SIZES))
 
@@ -75,7 +75,7 @@ def dense(noise: NoiseModel) -> np.ndarray:
     sizes = np.concatenate(
         [
             [noise.relative_noise_levels[r.noise_process_index]] * (r.stop_row - r.start_row)
-            for r in noise.sampling_runs
+            for r in noise.uniform_sampling_runs
         ]
     )
     if noise is CHANGING:
@@ -84,7 +84,7 @@ def dense(noise: NoiseModel) -> np.ndarray:
         return np.diag(sizes**2)
     blocks = [
         toeplitz(seen[r.noise_process_index][: r.stop_row - r.start_row])
-        for r in noise.sampling_runs
+        for r in noise.uniform_sampling_runs
     ]
     return np.asarray(block_diag(*blocks) * np.outer(sizes, sizes))
 
@@ -108,7 +108,7 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(
     jacobian = np.column_stack([np.ones(130), np.linspace(0.0, 50.0, 130), rng.normal(size=130)])
     residuals = 1e-3 * rng.normal(size=130)
     products = noises._LaggedProductSums(
-        noise.sampling_runs, np.column_stack([jacobian, residuals]), 3
+        noise.uniform_sampling_runs, np.column_stack([jacobian, residuals]), 3
     )
 
     def exact(matrix: np.ndarray) -> float:
@@ -119,7 +119,7 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(
         logs = np.linalg.slogdet(matrix)[1] + np.linalg.slogdet(told)[1]
         return float((130 - 3) * math.log(squares) + logs)
 
-    plain = NoiseModel(noise.sampling_runs, np.zeros((2, 3)), np.array([1.0, 2.0]))
+    plain = NoiseModel(noise.uniform_sampling_runs, np.zeros((2, 3)), np.array([1.0, 2.0]))
     apart = exact(dense(noise)) - exact(dense(plain))
     assert products.compute_restricted_likelihood_objective(
         noise
@@ -127,7 +127,7 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(
 
 
 def test_independent_samples_of_first_order() -> None:
-    one = NoiseModel((SamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
+    one = NoiseModel((UniformSamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
     assert one.effective_sample_size == pytest.approx(500 * 0.1 / 1.9)
 
 
@@ -137,7 +137,7 @@ def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     The first-order case has a closed form. For higher orders, the reference is the scatter
     of the estimated power at zero frequency.
     """
-    one = NoiseModel((SamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
+    one = NoiseModel((UniformSamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
     assert one.low_frequency_noise_degrees_of_freedom == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
     assert (
         noises.build_white_noise_model(np.arange(500.0)).low_frequency_noise_degrees_of_freedom
@@ -147,13 +147,13 @@ def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     for _ in range(400):
         drawn = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=3_200))[200:]
         found = NoiseModel(
-            (SamplingRun(0, 3_000, 0, 0, 0),),
+            (UniformSamplingRun(0, 3_000, 0, 0, 0),),
             np.array([noises._estimate_burg_coefficients([drawn], 3)]),
             np.ones(1),
         )
         logs.append(math.log(np.var(drawn) / found.effective_sample_size))
     exact = NoiseModel(
-        (SamplingRun(0, 3_000, 0, 0, 0),), np.array([partial(AR3)]), np.ones(1)
+        (UniformSamplingRun(0, 3_000, 0, 0, 0),), np.array([partial(AR3)]), np.ones(1)
     ).low_frequency_noise_degrees_of_freedom
     # The variance of 400 samples has a relative standard error of 1/14.
     assert 2.0 / np.var(logs) == pytest.approx(exact, rel=0.25)
@@ -205,19 +205,27 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     fast = lfilter([1.0], [1.0, -0.95], rng.normal(size=1_500))[600:] * math.sqrt(1 - 0.95**2)
     left = np.concatenate([slow, 3.0 * fast])
     found = noises.fit_noise_model("ar1", time, left, np.ones((1_500, 1)))
-    assert [(*run[:2], run.row_count_since_time_restart) for run in found.sampling_runs] == [
+    assert [
+        (*run[:2], run.row_count_since_time_restart) for run in found.uniform_sampling_runs
+    ] == [
         (0, 600, 0),
         (600, 1_500, 600),
     ]
     coefficients = dict(
-        zip([run.noise_process_index for run in found.sampling_runs], (0.5, 0.95), strict=True)
+        zip(
+            [run.noise_process_index for run in found.uniform_sampling_runs],
+            (0.5, 0.95),
+            strict=True,
+        )
     )
     for number, exact in coefficients.items():
         assert found.partial_autocorrelations[number, 0] == pytest.approx(exact, abs=0.12)
     for noise in (found, noises.fit_noise_model("white", time, left, np.ones((1_500, 1)))):
         # 900 samples with a correlation of 0.95 contain 23 independent samples, which determine
         # the level to 15 %.
-        sizes = noise.relative_noise_levels[[run.noise_level_index for run in noise.sampling_runs]]
+        sizes = noise.relative_noise_levels[
+            [run.noise_level_index for run in noise.uniform_sampling_runs]
+        ]
         assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.5)
 
 
@@ -229,7 +237,7 @@ def test_a_clock_that_is_uneven_is_one_process(quantum: float) -> None:
     """
     rng = np.random.default_rng(6)
     time = np.cumsum(np.where(rng.random(2_000) < 0.5, 1.0, 2.0 if quantum else 1.2)) * 0.01
-    assert find_sampling_runs(time) == (SamplingRun(0, 2_000, 0, 0, 0),)
+    assert find_uniform_sampling_runs(time) == (UniformSamplingRun(0, 2_000, 0, 0, 0),)
 
 
 @pytest.mark.parametrize("order", [0, 3])
@@ -257,7 +265,7 @@ def test_the_noise_level_may_change(rho: float) -> None:
     left[300:] *= 4.0
     found = noises.fit_noise_model("ar", np.arange(900.0), left, np.ones((900, 1)))
     assert len(found.relative_noise_levels) == 2
-    assert abs(found.sampling_runs[1].start_row - 300) < 30
+    assert abs(found.uniform_sampling_runs[1].start_row - 300) < 30
     assert found.relative_noise_levels[1] == pytest.approx(4.0, rel=0.3)
     # The local noise level determines the weights of the quiet rows.
     weights = found.whiten_columns(np.ones((900, 1)))[:, 0] ** 2
@@ -284,7 +292,7 @@ def test_a_clock_with_jitter_keeps_its_two_sampling_rates() -> None:
     rng = np.random.default_rng(13)
     gaps = np.repeat([0.2, 0.02], [200, 1_000])
     time = np.cumsum(gaps) + 0.3 * gaps * rng.uniform(-1.0, 1.0, 1_200)
-    runs = find_sampling_runs(time)
+    runs = find_uniform_sampling_runs(time)
     assert [run.noise_process_index for run in runs] == [1, 0] or [
         run.noise_process_index for run in runs
     ] == [0, 1]

@@ -18,9 +18,9 @@ from rsfstudy.critical_steps import critical_step
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.critical_steps.stability_after_step import (
+    has_closed_orbits_at_critical_stiffness,
     has_frictional_damping_only,
     is_neutrally_stable,
-    may_have_closed_orbits,
 )
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.integrator import Integrator
@@ -52,7 +52,7 @@ def test_an_extreme_law():
     )
     value, error, _outcome = found(scene)
     q = 1.0 / (1.0 + value)
-    start = closed_forms.steady_state_offset_after_normal_stress_fall(
+    start = closed_forms.compute_state_offset_after_stress_fall(
         scene.mu_star, scene.a, scene.b_over_a, 0.4, q
     )
     assert start == pytest.approx(math.asinh(2.0 * q), abs=(error + 1e-7 * abs(value)) / scene.a)
@@ -181,7 +181,7 @@ def test_normal_stress_that_is_imposed_is_constant_between_steps():
     """
     scene = Scene(**IMPOSED, alpha=0.5, load_velocity_ratio=2.0)
     assert has_frictional_damping_only(scene)
-    assert may_have_closed_orbits(scene)
+    assert has_closed_orbits_at_critical_stiffness(scene)
     assert not has_frictional_damping_only(Scene(alpha=0.5))
     stepped = scene.with_(normal_stress_step=0.25, stiffness_ratio=1.25)
     after = stability.compute_critical_stiffness(stepped, stepped.log_load_velocity)

@@ -52,7 +52,7 @@ def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(ov
 
 def test_once_over_it_leaves_no_unknown():
     scene = Scene(**IMPOSED, **RAMP)
-    (during, first), (after, last) = scene.continuous_segments
+    (during, first), (after, last) = scene.segment_sequences_without_jumps
     assert (during.state_count, after.state_count) == (2, 1)
     assert [*first[0, :2], *last[0, :2]] == [0.0, 4.0, 4.0, math.inf]
     assert (

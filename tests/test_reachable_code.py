@@ -23,13 +23,13 @@ from rsfstudy.slider import part_registry
 from rsfstudy.storage import fingerprints, stored_declarations
 
 PACKAGE = Path(rsfstudy.__file__).parent
-SOURCES = provenance.read_physics_source_files(PACKAGE)
+SOURCES = provenance.read_source_files_affecting_results(PACKAGE)
 SLIP = Scene(law="slip", normal_stress="constant", b_over_a=1.5)
 OPTIONS = {"workers": 0, "progress": False, "rtol": 1e-4}
 
 
 def reach(measure, *scenes):
-    return provenance.digest_reachable_modules(measure, scenes)
+    return provenance.digest_modules_affecting_results(measure, scenes)
 
 
 def edit(monkeypatch, path):

@@ -26,7 +26,7 @@ from rsfstudy.errors import CallError, DataError, InvalidValue
 from rsfstudy.rig import readers
 from rsfstudy.rig.columns import Column
 from rsfstudy.rig.readers import spreadsheets, text_layout
-from rsfstudy.rig.readers.table_sources import SourceTable, TableSource
+from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
 
 ROWS = 40
 TIME = 0.25 * np.arange(ROWS)
@@ -312,9 +312,9 @@ def test_datasets_and_frames(tmp_path: Path) -> None:
 def test_a_new_format_is_one_pair_of_functions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def read_raw(source: TableSource) -> SourceTable:
+    def read_raw(source: TableSource) -> LazyTable:
         values = np.frombuffer(source.read_all_bytes()[4:]).reshape(4, -1)
-        return SourceTable(
+        return LazyTable(
             HEADINGS, str(source.path_or_object), lambda n, _name: Column(values[n], "")
         )
 

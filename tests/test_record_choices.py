@@ -95,11 +95,11 @@ def test_free_parameters_are_those_of_the_laws():
 
 def test_an_excluded_step_is_found_again_in_another_window(record):
     choices = FitChoices(excluded=(140.0,), begin=110.0)
-    window = choices.cut_window_from(record)
+    window = choices.extract_fit_window(record)
     assert [round(step.start) for step in window.loading_steps] == [140]
     assert choices.find_excluded_step_numbers(window.loading_steps) == [1]
     earlier = FitChoices(excluded=(140.0,), end=135.0)
-    window = earlier.cut_window_from(record)
+    window = earlier.extract_fit_window(record)
     assert [round(step.start) for step in window.loading_steps] == [100]
     assert earlier.find_excluded_step_numbers(window.loading_steps) == []
 
@@ -134,7 +134,7 @@ def test_the_command_line_makes_the_same_fit(record, tmp_path, monkeypatch):
         columns=columns, normal_stress="20 MPa", begin=60.0, excluded=(140.0,),
         laws=("slowness",), stiffness="0.04 MPa/um", trend_degree=0, after="60 um", noise="ar1",
     )  # fmt: skip
-    window = choices.cut_window_from(record)
+    window = choices.extract_fit_window(record)
     fitting = choices.build_fit_arguments(window.loading_steps)
     command = format_fit_command(
         str(STEP),

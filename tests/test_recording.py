@@ -18,7 +18,7 @@ from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import Event, EventKind
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.motion_resampling import resample_motion_along_path
-from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, Recording
+from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, MotionRecorder
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
 
@@ -50,7 +50,7 @@ TIMES = np.array([0.0, 1e-9, 0.7, 0.7000001, 3.0, 3.5, 8.0, 8.0 + 1e-9, 10.0, 12
 
 def recorded(scene: Scene, engine: str, times: np.ndarray, until: float = math.inf):
     """Return the recorded table and the events of a motion."""
-    recording, events = Recording(sample_times=times), list[Event]()
+    recording, events = MotionRecorder(sample_times=times), list[Event]()
     integrator = Integrator(Accuracy(RTOL, 10**6, engine=engine))
     motion = integrator.follow(scene, with_time=True, until=until, recording=recording)
     for event in motion:
@@ -148,7 +148,7 @@ def weights(scene: Scene) -> dict[str, float]:
 
 def exactly(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
     """Return the motion at given times with a much smaller tolerance."""
-    recording = Recording(sample_times=times)
+    recording = MotionRecorder(sample_times=times)
     integrator = Integrator(Accuracy(1e-11, 10**7, engine=COMPILED))
     list(integrator.follow(scene, until=float(times[-1]), recording=recording))
     return dict(zip(RECORDED_VARIABLE_NAMES, recording.as_table(scene).T, strict=False))
@@ -214,7 +214,7 @@ def test_points_along_a_path_are_those_of_the_compiled_loop():
     point, and all other points agree to rounding.
     """
     scene = Scene(law="slip", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
-    recording, changes = Recording(), 0
+    recording, changes = MotionRecorder(), 0
     for event in Integrator(Accuracy(1e-6, 20_000)).follow(
         scene, with_time=True, recording=recording
     ):

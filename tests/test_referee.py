@@ -63,7 +63,7 @@ def test_answers_are_those_of_a_second_way(number):
     assert (
         [*rows[0]]
         == columns(read_stated_problem(find_shipped_problem_files()[number]))
-        == [*problem.column_names]
+        == [*problem.answer_column_names]
     )
     for name in problem.quantities:
         both = [(row[name], other[name]) for row, other in zip(rows, others, strict=True)]
@@ -84,7 +84,9 @@ def test_files_of_problems_hold_all_that_they_are_asked_for(number):
     text = find_shipped_problem_files()[number].read_text()
     assert problem.equations
     assert problem.conventions
-    assert [f"{name} ({UNITS[name]})" for name in problem.column_names] == problem.column_headings
+    assert [
+        f"{name} ({UNITS[name]})" for name in problem.answer_column_names
+    ] == problem.answer_column_headings
     # The example requires SI units.
     units = re.findall(r'"[-+.e\d]+ ([^"]+)"', text)
     assert {*units} <= {"Pa", "m/s", "m", "s", "Pa/m", "Pa s/m", "1/s"}
@@ -133,13 +135,20 @@ def write(path: Path, header: list[str], columns: list) -> Path:
 
 def told_by_second_way(number: int) -> dict[str, np.ndarray]:
     rows = second_way(number)
-    return {name: np.array([float(row[name]) for row in rows]) for name in of(number).column_names}
+    return {
+        name: np.array([float(row[name]) for row in rows])
+        for name in of(number).answer_column_names
+    }
 
 
 def filed(path: Path, number: int, **changes: np.ndarray) -> Path:
     """Write the results of the second method, with changes, to a file."""
     told = told_by_second_way(number) | changes
-    return write(path, of(number).column_headings, [told[name] for name in of(number).column_names])
+    return write(
+        path,
+        of(number).answer_column_headings,
+        [told[name] for name in of(number).answer_column_names],
+    )
 
 
 #: Published curves by problem number, with their column descriptions.
@@ -269,8 +278,8 @@ def test_the_number_of_rows_is_checked_before_columns_are_converted(tmp_path):
     The conversion needs the normal stress at the times of the problem.
     """
     told = told_by_second_way(15)
-    header = [h.replace("friction (1)", "shear_stress (Pa)") for h in of(15).column_headings]
-    columns = [told[name][:-1] for name in of(15).column_names]
+    header = [h.replace("friction (1)", "shear_stress (Pa)") for h in of(15).answer_column_headings]
+    columns = [told[name][:-1] for name in of(15).answer_column_names]
     ran = call_main("verify", write(tmp_path / "15.csv", header, columns))
     count = len(told["time"])
     said = " ".join(ran.stderr.split())
@@ -321,8 +330,10 @@ def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_pat
         17: told.get("normal_stress"),
         18: sigma - told.get("pore_pressure", 0.0),
     }[number]
-    header = [h.replace("friction (1)", "shear_stress (Pa)") for h in problem.column_headings]
-    columns = [told[n] * (sigma if n == "friction" else 1.0) for n in problem.column_names]
+    header = [
+        h.replace("friction (1)", "shear_stress (Pa)") for h in problem.answer_column_headings
+    ]
+    columns = [told[n] * (sigma if n == "friction" else 1.0) for n in problem.answer_column_names]
     found = external_answers.read_external_answer(
         write(tmp_path / "mine.csv", header, columns), problem
     )
@@ -335,12 +346,12 @@ def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_pat
 def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
     """An unnecessary column of shear stress is ignored."""
     told = told_by_second_way(13)
-    header = [*of(13).column_headings, "shear_stress (Pa)"]
-    columns = [*(told[name] for name in of(13).column_names), told["slip_rate"]]
+    header = [*of(13).answer_column_headings, "shear_stress (Pa)"]
+    columns = [*(told[name] for name in of(13).answer_column_names), told["slip_rate"]]
     found = external_answers.read_external_answer(
         write(tmp_path / "13.csv", header, columns), of(13)
     )
-    assert [*found] == [*of(13).column_names]
+    assert [*found] == [*of(13).answer_column_names]
 
 
 def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
@@ -376,7 +387,9 @@ def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
 )
 def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
     told = told_by_second_way(1)
-    header, columns = spoil(of(1).column_headings, [told[name] for name in of(1).column_names])
+    header, columns = spoil(
+        of(1).answer_column_headings, [told[name] for name in of(1).answer_column_names]
+    )
     file = write(tmp_path / "01.csv", header, columns)
     with pytest.raises(InvalidValue, match=re.escape(error)):
         external_answers.read_external_answer(file, of(1))
@@ -444,16 +457,16 @@ def test_a_problem_of_ones_own(text, tmp_path):
         {"times": [], "report": "series", **read_stated_problem(tmp_path / "plain.toml")}
     )
     problem = read_problem(path)
-    told = [[row[name] for row in rows] for name in problem.column_names]
-    file = write(tmp_path / "mine.csv", problem.column_headings, told)
+    told = [[row[name] for row in rows] for name in problem.answer_column_names]
+    file = write(tmp_path / "mine.csv", problem.answer_column_headings, told)
     ran = call_main("verify", file, "--problem", path)
     assert (ran.returncode, ran.stderr) == (0, "")
     assert re.search(r"1 user-defined problem, (8|9|10|11|12) digits", ran.stdout)
     given = {"slip_rate": rows[0]["slip_rate"] * 1.01}
-    spoilt = [[{**row, **given}[name] for row in rows] for name in problem.column_names]
+    spoilt = [[{**row, **given}[name] for row in rows] for name in problem.answer_column_names]
     assert (
         call_main(
-            "verify", write(file, problem.column_headings, spoilt), "--problem", path
+            "verify", write(file, problem.answer_column_headings, spoilt), "--problem", path
         ).returncode
         == 1
     )

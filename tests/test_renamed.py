@@ -19,7 +19,7 @@ from rsfstudy._deprecation import (
     NEW_NAME_BY_OWNER_AND_FORMER_NAME,
     accept_former_keyword_names,
     add_former_member_names,
-    add_new_names_for_former_members,
+    add_new_names_for_former_overrides,
     translate_former_member_name,
 )
 from rsfstudy.critical_steps.critical_step import CriticalStep
@@ -184,7 +184,7 @@ def test_helpers_leave_other_names_alone(monkeypatch):
     with pytest.warns(DeprecationWarning, match=r"'old' of Kind\(\) is now called 'new'"):
         assert kind(old=5).new == 5
     assert translate_former_member_name(kind, "other") == "other"
-    add_new_names_for_former_members(kind)
+    add_new_names_for_former_overrides(kind)
 
 
 def test_former_keywords_are_passed_on_under_the_new_names():

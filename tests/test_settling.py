@@ -209,5 +209,7 @@ def test_growth_of_zero_is_undecided(off, settles):
 @pytest.mark.parametrize(("ratio", "flag"), [(0.99, 0.0), (1.0, math.nan), (1.2, 1.0)])
 def test_a_flat_record_has_settled_only_if_small_changes_decay(ratio, flag):
     scene = Scene(law="slip", normal_stress="constant", a=0.01, stiffness_ratio=ratio)
-    assert compute_settled_friction_flag(scene, is_flat=True) == pytest.approx(flag, nan_ok=True)
-    assert compute_settled_friction_flag(scene, is_flat=False) == 0.0
+    assert compute_settled_friction_flag(scene, is_friction_constant=True) == pytest.approx(
+        flag, nan_ok=True
+    )
+    assert compute_settled_friction_flag(scene, is_friction_constant=False) == 0.0

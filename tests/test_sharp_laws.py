@@ -62,7 +62,7 @@ def test_critical_stiffness_of_a_law_that_bends_sharply(width, place):
     ours = stability.compute_critical_stiffness(scene, log_slip_rate)
     steady = compute_steady_sliding(scene, log_slip_rate)
     assert steady is not None
-    error = compute_state_evolution_derivatives(scene, steady).relative_error
+    error = compute_state_evolution_derivatives(scene, steady).max_relative_error_estimate
     # The derivative is b/(b - a) = 2 times as large as its difference from a.
     assert abs(ours / exact - 1.0) < 2.0 * error < 1e-8
 

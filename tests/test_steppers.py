@@ -169,7 +169,7 @@ def begun(
     equations: EquationsOfMotion, y, tolerance: float, kind: type[Stepper], method: str = "DOP853"
 ) -> tuple[Stepper, SimpleNamespace, Workspace]:
     """Return a stepper at the start of a path, with motion and workspace."""
-    stepper = kind((equations,), {equations.regime: method})
+    stepper = kind((equations,), {equations.regime_name: method})
     n, states = len(y), equations.state_count
     given = {"tolerance": tolerance, "budget": 10**6, "direction": 1.0, "end_time": math.inf}
     motion = SimpleNamespace(**{**dict.fromkeys(array_layout.MOTION_STATE_DTYPE.names, 0), **given})

@@ -9,7 +9,7 @@ from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
     build_events_testing_monotone_rise,
-    rises_monotonically_to_load_rate,
+    is_slip_rate_rise_monotone,
 )
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
@@ -58,7 +58,7 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
         scene, [maximum("log_slip_rate"), approach_to_steady_state(1e-3), *levels]
     ):
         if event.specification in levels and not told[-1]:
-            told.append(rises_monotonically_to_load_rate(scene, event.point))
+            told.append(is_slip_rate_rise_monotone(scene, event.point))
         assert not (event.kind is EventKind.MAXIMUM and told[-1])
         assert event.point.log_slip_rate <= scene.log_load_velocity or not told[-1]
         if event.kind is EventKind.SETTLED:
@@ -78,7 +78,7 @@ def test_oscillations_do_not_rise_to_the_load_point():
     scene = Scene(stiffness_ratio=1.1, load_velocity_ratio=1.1, radiation_damping=1e-12)
     start = next(Integrator(Accuracy(1e-6, 10**5)).follow(scene))
     assert start.point.log_slip_rate < scene.log_load_velocity
-    assert not rises_monotonically_to_load_rate(scene, start.point)
+    assert not is_slip_rate_rise_monotone(scene, start.point)
 
 
 @pytest.mark.parametrize("engine", ENGINE_NAMES)

@@ -113,7 +113,7 @@ def foreign() -> Iterator[tuple[dict[str, Any], str]]:
                 calls = calling(other)
                 for name in sorted(
                     {*list_part_field_names(part)}
-                    - {*list_part_field_names(other), part.selected_by}
+                    - {*list_part_field_names(other), part.selecting_field_name}
                 ):
                     if PART_CLASS_BY_FIELD_NAME[name] is part:
                         yield {**calls, name: 0.5}, name

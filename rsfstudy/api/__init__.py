@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rsfstudy.api.fit_record import DEFAULT_FREE_PARAMETERS, STIFFNESS_OPTION_FROM_RECORD, fit
     from rsfstudy.api.html_report import write_html_report
     from rsfstudy.api.result_paths import find_results_file
-    from rsfstudy.api.simulation import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME, simulate
+    from rsfstudy.api.simulation import UNPHYSICAL_MOTION_ATTRIBUTE_NAME, simulate
     from rsfstudy.api.study_runs import (
         apply_overrides_to_study,
         make_run_function_with_progress,
@@ -38,7 +38,7 @@ else:
     )
 
 __all__ = [
-    "BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME",
+    "UNPHYSICAL_MOTION_ATTRIBUTE_NAME",
     "DEFAULT_FREE_PARAMETERS",
     "STIFFNESS_OPTION_FROM_RECORD",
     "apply_overrides_to_study",

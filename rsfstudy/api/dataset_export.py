@@ -14,7 +14,7 @@ import xarray as xr
 from rsfstudy.api.simulation import simulate
 from rsfstudy.errors import DataError
 from rsfstudy.formatting import read_flag_meanings
-from rsfstudy.quantities import read_units_or_scale
+from rsfstudy.quantities import read_units_or_reference_scale
 from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.storage import compare_results_of_same_study
 
@@ -52,7 +52,7 @@ def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
         table = table[changing]
         table.attrs["constant"] = constant
     table.attrs["units"] = {
-        str(n): read_units_or_scale(dataset[n].attrs) or "1"
+        str(n): read_units_or_reference_scale(dataset[n].attrs) or "1"
         for n in table
         if table[n].dtype.kind in "iuf"
     }

@@ -22,7 +22,7 @@ from rsfstudy.fitting import (
     read_drops,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.rig import ReadingOptions, compute_conversion_factor, convert_to_si
+from rsfstudy.rig import RecordReadingOptions, compute_conversion_factor, convert_to_si
 
 #: Mapping from the scale of a quantity to a variable of the record. The quantity has the units of
 #: this variable.
@@ -34,7 +34,7 @@ _MEANINGS_OF_EVENT_TRUNCATION_FLAGS = ("whole", "begins_before", "lasts_beyond",
 
 #: Limit of the ratio of the largest decrease of stress to the smallest detectable drop of stress.
 #: If no drop is found and the ratio exceeds the limit, the function ``events`` emits a warning.
-_SUSPICIOUS_DECREASE_OVER_DETECTABLE_DROP = 10.0
+_SUSPICIOUS_STRESS_FALL_OVER_MIN_DROP = 10.0
 
 
 def build_event_catalogue(
@@ -237,7 +237,7 @@ def events(
     >>> catalogue["static_stress_drop"].values.round(1)
     array([0.5, 0.5, 0.5])
     """
-    options = ReadingOptions.from_keywords("events", reading)
+    options = RecordReadingOptions.from_keywords("events", reading)
     if record is None:
         given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
         read = StressRecord(given)
@@ -299,13 +299,13 @@ def events(
         {"long_name": "standard deviation of the noise", **units},
     )
     words = "smallest detectable drop of shear stress (missed once in 1,000 records)"
-    dataset["smallest_drop"] = ((), detection.detectable_drop, {"long_name": words, **units})
+    dataset["smallest_drop"] = ((), detection.min_detectable_drop, {"long_name": words, **units})
     dataset.attrs["sign_of_shear_stress"] = int(direction)
     if read.processing_steps:
         dataset.attrs["processing"] = "; ".join(read.processing_steps)
     if not read.has_time:
         dataset = _rename_times_to_displacements(dataset)
-    if not rows and (text := _warn_if_stress_falls_without_drop(detection)):
+    if not rows and (text := _warn_if_large_stress_fall_undetected(detection)):
         dataset.attrs["comment"] = text
     return dataset
 
@@ -381,7 +381,7 @@ def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:
     return float(stated_sign)
 
 
-def _warn_if_stress_falls_without_drop(detection: Detection) -> str:
+def _warn_if_large_stress_fall_undetected(detection: Detection) -> str:
     """Warn if no drop is found although stress falls considerably.
 
     Returns
@@ -390,14 +390,14 @@ def _warn_if_stress_falls_without_drop(detection: Detection) -> str:
         Message of the warning, or an empty string if no warning was issued.
     """
     if (
-        not detection.max_decrease
-        > _SUSPICIOUS_DECREASE_OVER_DETECTABLE_DROP * detection.detectable_drop
+        not detection.max_moving_average_decrease
+        > _SUSPICIOUS_STRESS_FALL_OVER_MIN_DROP * detection.min_detectable_drop
     ):
         return ""
     text = (
-        f"no drop was detected, although stress decreases by {detection.max_decrease:.4g} in "
-        f"total, which is {detection.max_decrease / detection.detectable_drop:.0f} times the "
-        f"smallest detectable drop ({detection.detectable_drop:.4g}). The decrease is too slow or "
+        f"no drop was detected, although stress decreases by {detection.max_moving_average_decrease:.4g} in "
+        f"total, which is {detection.max_moving_average_decrease / detection.min_detectable_drop:.0f} times the "
+        f"smallest detectable drop ({detection.min_detectable_drop:.4g}). The decrease is too slow or "
         "lasts for most of the record"
     )
     remedy = "Select a part of the record, or pass sign=-1 if the shear stress is negative"

@@ -16,9 +16,9 @@ import xarray as xr
 
 from rsfstudy.api import study_runs
 from rsfstudy.api.record_checks import (
+    check_alpha_can_be_fitted,
     check_displacement_is_not_slip,
     check_displacement_was_not_reset,
-    check_normal_stress_changes_for_alpha,
     check_step_can_be_fitted,
 )
 from rsfstudy.axes import Axis
@@ -72,7 +72,7 @@ _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 _MAX_FIT_WINDOW_COUNT = 1000
 #: Length of the shortest window of a fit, as a fraction of the load point displacement after a
 #: step.
-_MIN_WINDOW_LENGTH_OVER_FULL_LENGTH = 0.5
+_SHORTEST_FIT_WINDOW_FRACTION = 0.5
 #: Initial values of the scene fields in a fit. Values that the user passes take precedence.
 _INITIAL_GUESS_OF_SCENE_FIELDS = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
 _INITIAL_GUESS_FOR_ONE_STATE_LAWS = {"b_over_a": 1.2}
@@ -288,7 +288,7 @@ def fit(
     if "alpha" in scene:
         scene = {"normal_stress": "imposed", **scene}
     if "alpha" in free:
-        check_normal_stress_changes_for_alpha(records, loading, numbers)
+        check_alpha_can_be_fitted(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
     ratio, machine, stiffness_error = _find_initial_stiffness(rig, stiffness, free, records)
     if machine:
@@ -325,9 +325,7 @@ def fit(
         rule = f"must be a whole number from 1 to {_MAX_FIT_WINDOW_COUNT:,}"
         raise InvalidValue("windows", windows, rule)
     if windows > 1:
-        axes.append(
-            Axis("part", np.linspace(1.0, _MIN_WINDOW_LENGTH_OVER_FULL_LENGTH, windows).tolist())
-        )
+        axes.append(Axis("part", np.linspace(1.0, _SHORTEST_FIT_WINDOW_FRACTION, windows).tolist()))
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
     chosen: Any = engine
     if engine is None:
@@ -429,7 +427,7 @@ def _find_initial_stiffness(
         remedy = "Pass --stiffness (stiffness=), for example '1.6e-3 /um', "
         remedy += "or fit the stiffness: --free (free=)."
         raise InvalidValue("stiffness", None, "is required", remedy=remedy)
-    over_stress = isinstance(stated_stiffness, Real) or Rig.is_stiffness_over_stress(
+    over_stress = isinstance(stated_stiffness, Real) or Rig.is_stiffness_in_friction_per_length(
         stated_stiffness
     )
     if isinstance(stated_stiffness, Real):

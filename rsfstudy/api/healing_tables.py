@@ -23,7 +23,7 @@ _MOTION_VARIABLES_FOR_HEALING = (
 )
 #: Friction has a peak if friction falls after its maximum by more than this multiple of the
 #: relative tolerance of the motion.
-_MIN_FRICTION_FALL_OVER_RTOL = 10.0
+_MIN_POST_PEAK_FALL_OVER_RTOL = 10.0
 #: Largest relative difference between load point velocities that are treated as equal, because the
 #: difference is due to rounding.
 _RTOL_OF_EQUAL_VELOCITIES = 1e-6
@@ -112,7 +112,7 @@ def measure_holds_of_motion(motion: xr.Dataset) -> xr.Dataset:
         np.column_stack([motion[n] for n in _MOTION_VARIABLES_FOR_HEALING]),
     )
     rows = InterpolatedMotionRows(time, values, 0.0)
-    least = _MIN_FRICTION_FALL_OVER_RTOL * float(motion.attrs.get("rtol", 0.0))
+    least = _MIN_POST_PEAK_FALL_OVER_RTOL * float(motion.attrs.get("rtol", 0.0))
     initial = float(motion.get("slip_rate", 10.0 ** motion["log10_slip_rate"])[0])
     segments = _find_constant_velocity_segments(time, values[:, 1], initial)
     found = [
@@ -158,7 +158,7 @@ def _measure_hold_of_motion(
     falls = np.flatnonzero(np.diff(friction[last : end + 1]) < 0.0)
     if len(falls):
         top = last + int(falls[0])
-        peak, error = interpolated_rows.find_extreme_near_row(top, 2, 1.0)
+        peak, error = interpolated_rows.find_extremum_near_row(top, 2, 1.0)
         if peak[2] - friction[top : end + 1].min() > min_friction_fall:
             numbers = [level, peak[2], peak[2] - level, relaxed, peak[1] - moved[last]]
             return numbers, [0.0, error[2], error[2], 0.0, error[1]]

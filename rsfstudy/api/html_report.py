@@ -183,7 +183,7 @@ def _build_html_page(directory: Path, file_sections: list[_ReportSectionOfFile])
     ]
     colours = [one.status_colour for one in file_sections]
     summary = TextTable(
-        rows, wrappable_columns={"title", "claims", "status"}, last_cell_colours=colours
+        rows, wrappable_columns={"title", "claims", "status"}, last_column_colours=colours
     )
     made = build_provenance_attributes("rsfstudy report")
     when, by = made["history"].split()[0], made["source"].partition(",")[0]
@@ -328,7 +328,7 @@ def _format_table_or_sentence_as_html(table_or_sentence: SummaryTableOrSentence)
     rows_ = []
     for row, colour in zip(
         table_or_sentence.rows,
-        table_or_sentence.last_cell_colours or [""] * len(table_or_sentence.rows),
+        table_or_sentence.last_column_colours or [""] * len(table_or_sentence.rows),
         strict=True,
     ):
         whole = {

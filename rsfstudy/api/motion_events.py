@@ -27,7 +27,7 @@ _MIN_EVENT_SLIP_RATE_OVER_LOAD_VELOCITY = 10.0
 _ROWS_PER_INTERPOLANT, _ROWS_PER_ERROR_CHECK_INTERPOLANT = 6, 4
 #: Maximum time difference between the row before and the row after a discontinuity of the motion,
 #: in spacings of floating-point numbers.
-_MAX_JUMP_DURATION_IN_FLOAT_SPACINGS = 16
+_MAX_DISCONTINUITY_DURATION_IN_ULPS = 16
 #: Maximum change of log10 slip rate between rows that are interpolated. In motions with a tolerance
 #: of 1e-4, log10 slip rate changes by up to 0.37 between neighbouring rows, except at the sudden
 #: beginning or end of a rupture.
@@ -193,9 +193,9 @@ class InterpolatedMotionRows:
             if last_row < end
             else self._read_time_and_slip_at_end_row(end)
         )
-        (rate, _, at_peak), (rate_error, _, peak_error) = self.find_extreme_near_row(peak, 0, 1.0)
-        (*_, before), (*_, before_error) = self.find_extreme_near_row(top, 2, 1.0)
-        (*_, after), (*_, after_error) = self.find_extreme_near_row(bottom, 2, -1.0)
+        (rate, _, at_peak), (rate_error, _, peak_error) = self.find_extremum_near_row(peak, 0, 1.0)
+        (*_, before), (*_, before_error) = self.find_extremum_near_row(top, 2, 1.0)
+        (*_, after), (*_, after_error) = self.find_extremum_near_row(bottom, 2, -1.0)
         cut = (first_row == 0 or highest == 0) + 2 * (last_row == end or lowest == end)
         return {
             "time": (begin, begun[0]),
@@ -240,7 +240,7 @@ class InterpolatedMotionRows:
         last = min(row + row_count // 2, len(self._times) - 1)
         apart = np.diff(
             self._times[first : last + 1]
-        ) > _MAX_JUMP_DURATION_IN_FLOAT_SPACINGS * np.spacing(self._times[row])
+        ) > _MAX_DISCONTINUITY_DURATION_IN_ULPS * np.spacing(self._times[row])
         apart[row - first] = True
         smooth = label(apart)[0]
         kept = np.flatnonzero(smooth == smooth[row - first])
@@ -288,8 +288,8 @@ class InterpolatedMotionRows:
         """Return the time and slip in the first or last row, with zero errors."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
-    def find_extreme_near_row(
-        self, row: int, column: int, sign: float
+    def find_extremum_near_row(
+        self, row: int, column: int, extremum_sign: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Find a maximum or a minimum of a column near a row.
 
@@ -313,7 +313,7 @@ class InterpolatedMotionRows:
             best = self._values[row]
             for begin in range(sides.start, sides.start + len(times) - 1):
                 span = self._times[begin + 1] - self._times[begin]
-                if span <= _MAX_JUMP_DURATION_IN_FLOAT_SPACINGS * np.spacing(times[-1]):
+                if span <= _MAX_DISCONTINUITY_DURATION_IN_ULPS * np.spacing(times[-1]):
                     continue
                 through = self._build_interpolant_after_row(begin, number)
                 if (
@@ -326,7 +326,7 @@ class InterpolatedMotionRows:
                         0.0,
                         span,
                     )
-                    best = max(best, through(at), key=lambda values: sign * values[column])
+                    best = max(best, through(at), key=lambda values: extremum_sign * values[column])
             found.append(best)
         many, fewer = found
         # Times have few significant digits in a rupture. Because the extreme is flat, rounding

@@ -26,8 +26,8 @@ _MIN_REMAINING_SECONDS_TO_PRINT = 20.0
 def show_progress(
     study_name: str,
     is_shown_or_callback: bool | ProgressCallback,
-    items: str = "cells",
-    delay: float = 0.0,
+    item_name: str = "cells",
+    delay_seconds: float = 0.0,
 ) -> Iterator[ProgressCallback]:
     """Show the progress of a run on standard error, or report it to a function.
 
@@ -55,9 +55,9 @@ def show_progress(
     elif not is_shown_or_callback:
         yield lambda _done, _all, _remaining: None
     elif not (console.is_terminal or console.is_jupyter):
-        yield _make_progress_line_printer(study_name, console, items, delay)
+        yield _make_progress_line_printer(study_name, console, item_name, delay_seconds)
     else:
-        counts = (bars.MofNCompleteColumn(), bars.TextColumn(items))
+        counts = (bars.MofNCompleteColumn(), bars.TextColumn(item_name))
         times = (bars.TimeElapsedColumn(), bars.TimeRemainingColumn())
         told = (bars.TextColumn("{task.description}"), bars.BarColumn(), *counts, *times)
         bar = bars.Progress(*told, console=console)
@@ -66,7 +66,7 @@ def show_progress(
 
         def update(done: int, total: int, _remaining: float | None = None) -> None:
             """Update the progress bar."""
-            if time.monotonic() - began >= delay:
+            if time.monotonic() - began >= delay_seconds:
                 bar.start()  # The bar starts late because a run may fail before its first report.
                 bar.update(task, completed=done, total=total)
 
@@ -77,7 +77,7 @@ def show_progress(
 
 
 def _make_progress_line_printer(
-    study_name: str, console: Console, items: str, delay: float
+    study_name: str, console: Console, item_name: str, delay_seconds: float
 ) -> ProgressCallback:
     """Return a function that prints progress lines for log files and pipes.
 
@@ -97,24 +97,24 @@ def _make_progress_line_printer(
         nonlocal said, told, is_estimated
         now, part = time.monotonic(), _MAX_PROGRESS_LINES * done // total
         left = "" if remaining is None else f", about {format_duration(remaining)} left"
-        if now - began < delay:
+        if now - began < delay_seconds:
             return
         if not is_estimated and (remaining or 0.0) > _MIN_REMAINING_SECONDS_TO_PRINT:
             is_estimated = True
-            print_line(f"{done:,} of {total:,} {items} are finished{left}")
+            print_line(f"{done:,} of {total:,} {item_name} are finished{left}")
         if part > told and (
             part == _MAX_PROGRESS_LINES or now - said >= _MIN_PROGRESS_LINE_INTERVAL
         ):
             said, told = now, part
             print_line(
-                f"{done:,} of {total:,} {items} after {now - began:.0f} s{left * (done < total)}"
+                f"{done:,} of {total:,} {item_name} after {now - began:.0f} s{left * (done < total)}"
             )
 
     return update
 
 
 def compile_equations_with_notice(
-    example_scenes: Sequence[Scene], with_time_variable_flags: Sequence[bool], is_notice_shown: bool
+    example_scenes: Sequence[Scene], includes_time_flags: Sequence[bool], is_notice_shown: bool
 ) -> None:
     """Compile the equations of scenes, and print the compilation time.
 
@@ -135,7 +135,7 @@ def compile_equations_with_notice(
         replace(Engine.compilation_log),
     )
     with console.status("compiling the equations ..."):
-        for scene, clock in itertools.product(example_scenes, with_time_variable_flags):
+        for scene, clock in itertools.product(example_scenes, includes_time_flags):
             Engine.import_compiled_engine().compile_equations_of_scene(scene, with_time=clock)
     programs, seconds = (
         Engine.compilation_log.compiled_program_count - before.compiled_program_count,

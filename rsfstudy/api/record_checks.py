@@ -148,7 +148,7 @@ def check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep
         raise InvalidValue("displacement", told, rule, remedy=remedy)
 
 
-def check_normal_stress_changes_for_alpha(
+def check_alpha_can_be_fitted(
     records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
 ) -> None:
     """Raise an error if ``alpha`` cannot be fitted.

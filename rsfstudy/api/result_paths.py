@@ -35,7 +35,7 @@ def parse_output_path(output: str | Path | None) -> Path | None:
     return check_path_is_valid("output", output)
 
 
-def find_results_file(study_or_file: str | Path, output_path: str | Path | None) -> Path:
+def find_results_file(study_or_file: str | Path, output_directory: str | Path | None) -> Path:
     """Find the results file of a study.
 
     Parameters
@@ -68,7 +68,7 @@ def find_results_file(study_or_file: str | Path, output_path: str | Path | None)
     study = load_study(str(path)).name if path.suffix == ".py" else str(study_or_file)
     try:
         return _find_results_file_of_study(
-            study, parse_output_path(output_path) or Defaults.OUTPUT_DIRECTORY
+            study, parse_output_path(output_directory) or Defaults.OUTPUT_DIRECTORY
         )
     except OSError as error:
         raise DataError(
@@ -76,9 +76,9 @@ def find_results_file(study_or_file: str | Path, output_path: str | Path | None)
         ) from error
 
 
-def _find_results_file_of_study(study_name: str, output_path: Path) -> Path:
+def _find_results_file_of_study(study_name: str, output_directory: Path) -> Path:
     """Return the path of the NetCDF file or Zarr store of a study."""
-    file, in_pieces = output_path / f"{study_name}.nc", output_path / f"{study_name}.zarr"
+    file, in_pieces = output_directory / f"{study_name}.nc", output_directory / f"{study_name}.zarr"
     if file.exists() and in_pieces.exists():
         raise DataError(
             f"both {file} and {in_pieces} exist. Pass the path of one of them, "
@@ -86,16 +86,16 @@ def _find_results_file_of_study(study_name: str, output_path: Path) -> Path:
         )
     if file.exists() or in_pieces.exists():
         return file if file.exists() else in_pieces
-    partial = output_path / f"{study_name}.partial.nc"
+    partial = output_directory / f"{study_name}.partial.nc"
     if partial.exists():
         raise DataError(
             f"{file} does not exist, but the incomplete results {partial} exist. Run the study "
             "again, or pass the path of the incomplete results."
         )
-    there = any(file.name.startswith(f"{study_name}.") for file in output_path.glob("*"))
+    there = any(file.name.startswith(f"{study_name}.") for file in output_directory.glob("*"))
     if not there and study_name not in list_study_names():
         rule, remedy = (
-            f"has no results in {shorten_text(output_path)}",
+            f"has no results in {shorten_text(output_directory)}",
             "Results files have the suffix .nc or .zarr.",
         )
         raise InvalidValue("study", study_name, rule, choices=list_study_names(), remedy=remedy)

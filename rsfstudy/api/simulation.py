@@ -24,9 +24,9 @@ from rsfstudy.motion import (
     Event,
     EventKind,
     Integrator,
+    MotionRecorder,
     MotionStopped,
-    Recording,
-    accept_former_accuracy_and_meter,
+    accept_deprecated_accuracy_and_meter,
     rise,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
@@ -52,7 +52,7 @@ _INSTABILITY_TIME_QUANTITY = Quantity(
     "instability_time", "$t V_*/D_c$", "1", _INSTABILITY_TIME_LONG_NAME, "D_c/V_*"
 )
 #: Attribute that contains the time after which a motion has no physical meaning.
-BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME = "beyond_instability_norm"
+UNPHYSICAL_MOTION_ATTRIBUTE_NAME = "beyond_instability_norm"
 #: Attribute that contains the time, the slip and the state of the slider at the end of a motion.
 MOTION_END_STATE_ATTRIBUTE_NAME = "end"
 #: Limit of the ratio of slip rate to load point velocity. The limit defines instability if the load
@@ -72,7 +72,7 @@ _BUILT_IN_REGIME_NAMES = (
 
 
 @error_boundary
-@accept_former_accuracy_and_meter
+@accept_deprecated_accuracy_and_meter
 def simulate(
     scene: Scene,
     *extra_positional_arguments: Never,
@@ -228,7 +228,7 @@ def simulate(
     if is_alone and not scene.is_perturbed:
         warnings.warn(_UNPERTURBED_SCENE_MESSAGE, NoResultWarning, stacklevel=3)
     spent, by_regime = integrator.evaluations, dict(integrator.work_meter.evaluations_by_regime)
-    recording = Recording(list(_BUILT_IN_REGIME_NAMES), at)
+    recording = MotionRecorder(list(_BUILT_IN_REGIME_NAMES), at)
     status, message, limit, passed = (
         Status.OK,
         "",
@@ -292,7 +292,7 @@ def simulate(
             passed,
             _INSTABILITY_TIME_QUANTITY.attributes,
         )
-        dataset = dataset.assign_attrs({BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME: text})
+        dataset = dataset.assign_attrs({UNPHYSICAL_MOTION_ATTRIBUTE_NAME: text})
         if is_alone:
             warnings.warn(
                 f"the slip rate exceeds the instability norm {text}", NoResultWarning, stacklevel=3
@@ -329,25 +329,25 @@ def _convert_recording_to_dataset(
     fluid = scene.parts.fluid.unknowns
     columns = {
         find_quantity(name): recorded_rows[:, column]
-        for column, name in enumerate(Recording.MOTION_VARIABLE_NAMES)
+        for column, name in enumerate(MotionRecorder.MOTION_VARIABLE_NAMES)
     }
-    first = Recording.FIRST_STATE_COLUMN + scene.state_count - len(fluid)
+    first = MotionRecorder.FIRST_STATE_COLUMN + scene.state_count - len(fluid)
     columns |= {about: recorded_rows[:, first + i] for i, about in enumerate(fluid)}
-    after_law = Recording.FIRST_STATE_COLUMN + scene.parts.law.state_count
+    after_law = MotionRecorder.FIRST_STATE_COLUMN + scene.parts.law.state_count
     heat = scene.parts.temperature.unknowns
     columns |= {about: recorded_rows[:, after_law + i] for i, about in enumerate(heat)}
     if scene.parts.law.state_count > 1:
         of_law = range(scene.parts.law.state_count)
         columns |= {
             _build_state_variable_quantity(i + 1): recorded_rows[
-                :, Recording.FIRST_STATE_COLUMN + i
+                :, MotionRecorder.FIRST_STATE_COLUMN + i
             ]
             for i in of_law
         }
-    columns[find_quantity("load_point_displacement")] = Recording.compute_load_point_displacement(
-        scene, recorded_rows
+    columns[find_quantity("load_point_displacement")] = (
+        MotionRecorder.compute_load_point_displacement(scene, recorded_rows)
     )
-    columns[find_quantity("friction_coefficient")] = Recording.get_friction_coefficient(
+    columns[find_quantity("friction_coefficient")] = MotionRecorder.get_friction_coefficient(
         recorded_rows
     )
     dataset = xr.Dataset(
@@ -361,7 +361,11 @@ def _convert_recording_to_dataset(
         "flag_values": np.arange(len(regime_names), dtype=np.int8),
         "flag_meanings": " ".join(regime_names),
     }
-    dataset["regime"] = "time", recorded_rows[:, Recording.REGIME_COLUMN].astype(np.int8), flags
+    dataset["regime"] = (
+        "time",
+        recorded_rows[:, MotionRecorder.REGIME_COLUMN].astype(np.int8),
+        flags,
+    )
     about_rate = find_quantity("reference_rate").attributes
     dataset["reference_rate"] = (), scene.reference_rate, about_rate
     return dataset.set_coords(["slip", "reference_rate"])
@@ -511,7 +515,9 @@ def make_row_times_strictly_increasing(recorded_rows: np.ndarray) -> np.ndarray:
     same = (
         np.diff(
             np.delete(
-                recorded_rows, [Recording.REGIME_COLUMN, Recording.SAMPLE_NUMBER_COLUMN], axis=1
+                recorded_rows,
+                [MotionRecorder.REGIME_COLUMN, MotionRecorder.SAMPLE_NUMBER_COLUMN],
+                axis=1,
             ),
             axis=0,
         )

@@ -112,7 +112,7 @@ def critical_step(
         CriticalStep(of=of, direction=direction),
         scene,
         integrator or Integrator(Accuracy(rtol, budget, engine=engine)),
-        is_nested=integrator is not None,
+        is_used_by_other_measure=integrator is not None,
     )
 
 
@@ -188,7 +188,7 @@ def limit_cycle(
         LimitCycle(events=events),
         scene,
         integrator or Integrator(Accuracy(rtol, budget, engine=engine)),
-        is_nested=integrator is not None,
+        is_used_by_other_measure=integrator is not None,
     )
 
 
@@ -259,7 +259,7 @@ def to_si(
 
 
 def _compute_measure_as_dataset(
-    measure: Measure, scene: Scene, integrator: Integrator, *, is_nested: bool
+    measure: Measure, scene: Scene, integrator: Integrator, *, is_used_by_other_measure: bool
 ) -> xr.Dataset:
     """Compute a measure of a scene, and return the outputs as a dataset.
 
@@ -270,9 +270,11 @@ def _compute_measure_as_dataset(
     check_is_scene(scene)
     check_integrator_is_usable(integrator)
     outcome = (
-        measure.run_nested(scene, integrator) if is_nested else measure(scene, integrator.accuracy)
+        measure.run_nested(scene, integrator)
+        if is_used_by_other_measure
+        else measure(scene, integrator.accuracy)
     )
-    if is_nested:
+    if is_used_by_other_measure:
         pass
     elif outcome.status is not Status.OK:
         why = outcome.message or outcome.status.meaning

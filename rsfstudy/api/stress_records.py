@@ -10,18 +10,18 @@ import xarray as xr
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig import (
+    AcceptedRecordColumns,
     Column,
-    ReadingOptions,
-    UsableColumns,
+    RecordReadingOptions,
     compute_conversion_factor,
     convert_to_si,
     read_columns,
 )
 
 #: Columns that are used for event detection.
-_COLUMNS_FOR_EVENT_DETECTION = UsableColumns(
+_COLUMNS_FOR_EVENT_DETECTION = AcceptedRecordColumns(
     ("time", "slip", "displacement", "shear_stress", "friction", "normal_stress"),
-    shear_stress_suffices=True,
+    skips_normal_stress_if_shear_stress=True,
 )
 
 
@@ -51,7 +51,7 @@ def read_stress_record(
     record: Any,
     columns: Mapping[str, Any] | None,
     normal_stress: Any,
-    reading_options: ReadingOptions,
+    reading_options: RecordReadingOptions,
 ) -> StressRecord:
     """Read time, displacement and shear stress of a record in any format.
 
@@ -76,7 +76,7 @@ def read_stress_record(
     InvalidValue
         If the record has neither shear stress nor friction, or neither time nor displacement.
     """
-    whole = reading_options == ReadingOptions() and columns is None
+    whole = reading_options == RecordReadingOptions() and columns is None
     if whole and isinstance(record, xr.Dataset) and {"time", "shear_stress"} <= {*record.variables}:
         # Simulated motions have unit scales instead of units.
         names = ("time", "displacement", "shear_stress")
@@ -135,7 +135,7 @@ def _find_or_compute_shear_stress(columns: Mapping[str, Column], normal_stress: 
 
 
 def _filter_and_thin_columns(
-    columns: Mapping[str, Column], reading_options: ReadingOptions
+    columns: Mapping[str, Column], reading_options: RecordReadingOptions
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Filter and thin the columns. The filter needs the time in s."""
     values = {name: column.values for name, column in columns.items()}

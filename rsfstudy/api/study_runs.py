@@ -81,7 +81,7 @@ def studies() -> dict[str, Study]:
 
 
 #: Time in s after which the progress of fits is shown.
-_PROGRESS_DELAY_OF_FITS = 20.0
+_FIT_PROGRESS_DELAY_SECONDS = 20.0
 
 
 @error_boundary
@@ -294,7 +294,7 @@ def make_run_function_with_progress(
     ready = prepare_study_run(study, output_options, worker_pool)
     # Fits of a record usually take a few seconds, and then need no progress report.
     is_fit = study.plot == "fits"
-    appearance: Any = {"items": "fits", "delay": _PROGRESS_DELAY_OF_FITS} if is_fit else {}
+    appearance: Any = {"items": "fits", "delay": _FIT_PROGRESS_DELAY_SECONDS} if is_fit else {}
 
     def run() -> xr.Dataset:
         """Compile the equations if necessary, and run the study."""
@@ -392,7 +392,7 @@ def _open_dataset_if_name_or_path(dataset: xr.Dataset | str | Path) -> xr.Datase
 
 
 @accept_former_keyword_names
-@partial(error_boundary, is_called_internally=True)
+@partial(error_boundary, applies_to_internal_calls=True)
 def plot(
     dataset: xr.Dataset | str | Path,
     variable: str | None = None,
@@ -736,7 +736,7 @@ def recompute_cell(
     return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
 
 
-@partial(error_boundary, is_called_internally=True)
+@partial(error_boundary, applies_to_internal_calls=True)
 def _find_cell_in_results_file(
     results_or_path: xr.Dataset | str | Path,
     cell_coordinates: Mapping[str, Any],

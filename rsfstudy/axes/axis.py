@@ -17,7 +17,7 @@ import numpy as np
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names, warn_renamed
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import format_value, is_sequence_of_axis_values
+from rsfstudy.formatting import format_number_or_text, is_sequence_of_axis_values
 from rsfstudy.quantities import is_valid_variable_name
 from rsfstudy.slider import SceneFields
 
@@ -451,7 +451,9 @@ class Axis:
         if self.has_numbered_points:
             return list(map(str, range(len(self))))
         units = self.units.get(self.dimension, "")
-        values = (f"{format_value(row.get(self.dimension))} {units}".strip() for row in self.rows)
+        values = (
+            f"{format_number_or_text(row.get(self.dimension))} {units}".strip() for row in self.rows
+        )
         return list(self.labels or values)
 
 

@@ -82,7 +82,7 @@ def draw_samples(
     for (name, drawn), score, deviation in zip(
         distributions.items(), scores.T, deviations, strict=True
     ):
-        if _is_value_with_error(drawn):
+        if _is_mean_of_normal_distribution(drawn):
             found[name] = drawn + deviation * score
         else:
             found[name] = _compute_quantiles(name, drawn, ndtr(score))
@@ -113,7 +113,7 @@ def _check_sampling_arguments(
         remedy = f"Use n={below} or n={2 * below}, or method='latin_hypercube'."
         raise InvalidValue("n", sample_count, rule, remedy=remedy)
     for name, drawn in distributions.items():
-        if not _is_value_with_error(drawn) and _get_quantile_function(drawn) is None:
+        if not _is_mean_of_normal_distribution(drawn) and _get_quantile_function(drawn) is None:
             rule = "must be a frozen distribution of scipy.stats, or a mean value"
             raise InvalidValue(
                 name, drawn, rule, remedy="Pass, for example, scipy.stats.norm(0.01, 0.001)."
@@ -125,7 +125,9 @@ def _compute_stds_and_correlation_matrix(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the standard deviations and the correlation matrix."""
     count = len(distributions)
-    estimates = [name for name, drawn in distributions.items() if _is_value_with_error(drawn)]
+    estimates = [
+        name for name, drawn in distributions.items() if _is_mean_of_normal_distribution(drawn)
+    ]
     if covariance is None:
         if estimates:
             rule = "is a mean value without a variance"
@@ -201,7 +203,7 @@ def _draw_uniform_samples(
     )
 
 
-def _is_value_with_error(distribution: Any) -> bool:
+def _is_mean_of_normal_distribution(distribution: Any) -> bool:
     return isinstance(distribution, int | float | np.number) and not isinstance(distribution, bool)
 
 
@@ -233,7 +235,7 @@ def _compute_quantiles(
 
 def _describe_distribution(distribution: Any) -> Any:
     """Return a distribution as a string for display, or a mean value as a float."""
-    if _is_value_with_error(distribution):
+    if _is_mean_of_normal_distribution(distribution):
         return float(distribution)
     if not hasattr(distribution, "dist"):
         return str(distribution)

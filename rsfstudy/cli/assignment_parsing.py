@@ -41,7 +41,7 @@ def parse_overrides(study: Study, assignments: tuple[str, ...]) -> dict[str, Any
         If an assignment is malformed or a name is set twice.
     """
     texts = {p for axis in study.axes for p in axis.point_names if axis.labels or "," in p}
-    found = _parse_assignments_without_duplicates(
+    found = _parse_assignments_rejecting_duplicates(
         assignments, lambda text: parse_axis_assignment(text, texts)
     )
     if "loading" in found:
@@ -74,13 +74,13 @@ def parse_scene_field_assignments(assignments: tuple[str, ...]) -> dict[str, Any
         If an assignment is malformed or a field is set twice.
     """
     rule = "must have the form FIELD=VALUE, for example law=slowness"
-    given = _parse_assignments_without_duplicates(
+    given = _parse_assignments_rejecting_duplicates(
         assignments, lambda text: split_assignment("--set", text, rule)
     )
     return {name: parse_boolean_number_or_text(text) for name, text in given.items()}
 
 
-def _parse_assignments_without_duplicates(
+def _parse_assignments_rejecting_duplicates(
     assignments: tuple[str, ...], parse_assignment: Callable[[str], tuple[str, Any]]
 ) -> dict[str, Any]:
     """Parse assignments, and raise an error if a name is set twice."""

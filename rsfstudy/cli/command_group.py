@@ -104,7 +104,7 @@ class CommandGroup(click.Group):
             raise Interrupted(str(error) or "interrupted") from error
 
 
-class OptionsObjectCommand(click.Command):
+class CommandWithOptionsObject(click.Command):
     """Command that passes its arguments and options to a function as one object."""
 
     def invoke(self, context: click.Context) -> int:

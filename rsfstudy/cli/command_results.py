@@ -77,7 +77,9 @@ def print_result_as_text_or_json(
         "format": JSON_FORMAT_VERSION,
         "exit_status": result.exit_status,
     }
-    text = json.dumps(to_json_value(about | {**result.to_json_fields()}), indent=2, allow_nan=False)
+    text = json.dumps(
+        convert_to_json_value(about | {**result.to_json_fields()}), indent=2, allow_nan=False
+    )
     try:
         click.echo(text)
     except OSError as error:
@@ -85,7 +87,7 @@ def print_result_as_text_or_json(
     return result.exit_status
 
 
-def to_json_value(value: Any) -> Any:
+def convert_to_json_value(value: Any) -> Any:
     """Convert a value to a type that JSON can represent.
 
     Parameters
@@ -106,7 +108,7 @@ def to_json_value(value: Any) -> Any:
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, Mapping):
-        return {str(name): to_json_value(part) for name, part in value.items()}
+        return {str(name): convert_to_json_value(part) for name, part in value.items()}
     if isinstance(value, list | tuple | set | frozenset):
-        return [to_json_value(part) for part in value]
+        return [convert_to_json_value(part) for part in value]
     return str(value)

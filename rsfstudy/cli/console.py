@@ -11,7 +11,7 @@ from rsfstudy.errors import RunError, escape_control_characters, shorten_text
 
 #: Maximum number of characters of a printed string. The limit is needed because strings in files
 #: can have any length.
-_MAX_PRINTED_CHARACTERS = 5000
+_MAX_LENGTH_OF_PRINTED_STRING = 5000
 #: Bounds of the console width. The bounds are needed because the environment variable ``COLUMNS``
 #: can have any value.
 _MIN_WIDTH, _MAX_WIDTH = 16, 1000
@@ -96,7 +96,7 @@ def make_text_printable(text: str) -> str:
         String of at most about 5,000 characters, in which control characters are replaced by
         visible escape sequences.
     """
-    return escape_control_characters(shorten_text(text, _MAX_PRINTED_CHARACTERS))
+    return escape_control_characters(shorten_text(text, _MAX_LENGTH_OF_PRINTED_STRING))
 
 
 stdout_console = LiteralTextConsole(markup=False, emoji=False, highlight=False)

@@ -53,9 +53,9 @@ class StudyCostEstimate:
     """
 
     rhs_evaluations: int
-    seconds: float
+    estimated_seconds: float
     cell_count: int
-    measured_cell_count: int
+    timed_cell_count_in_study: int
     timed_cell_count_in_journal: int
     journal_path: Path
 
@@ -115,8 +115,8 @@ def collect_accuracy_and_cost_fields(cell_plan: CellPlan, output_directory: Path
         "rtol": cell_plan.study.accuracy.rtol,
         "cost": {
             "rhs_evaluations": cost.rhs_evaluations,
-            "seconds": cost.seconds,
-            "measured_cells": cost.measured_cell_count,
+            "seconds": cost.estimated_seconds,
+            "measured_cells": cost.timed_cell_count_in_study,
         },
     }
 
@@ -137,11 +137,14 @@ def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
         Text with the expected number of right-hand-side evaluations and the computing time.
     """
     cost = estimate_study_cost(cell_plan, output_directory)
-    rtol, time = cell_plan.study.accuracy.rtol, f"{format_duration(cost.seconds)} on one core"
+    rtol, time = (
+        cell_plan.study.accuracy.rtol,
+        f"{format_duration(cost.estimated_seconds)} on one core",
+    )
     text = f"about {cost.rhs_evaluations:,} right-hand-side evaluations at rtol {rtol:g}; "
     if not cost.timed_cell_count_in_journal:
         return f"{text}roughly {time} (may be up to ten times longer)"
-    if cost.measured_cell_count == cost.cell_count:
+    if cost.timed_cell_count_in_study == cost.cell_count:
         return f"{text}last run took {time} ({cost.journal_path})"
     return (
         f"{text}about {time}, based on {cost.timed_cell_count_in_journal:,} cells in "

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantities import read_units_or_scale
+from rsfstudy.quantities import read_units_or_reference_scale
 
 
 def to_csv(dataset: xr.Dataset, path: Path) -> None:
@@ -73,7 +73,7 @@ def to_mat(dataset: xr.Dataset, path: Path) -> None:
         if values.dtype.kind in "OUT":
             data[name] = np.array(values.tolist(), dtype=object)
     about = {
-        "units": {name: read_units_or_scale(dataset[name].attrs) for name in data},
+        "units": {name: read_units_or_reference_scale(dataset[name].attrs) for name in data},
         "dimensions": {name: " ".join(map(str, dataset[name].dims)) for name in data},
         "attributes": dataset.attrs,
     }

@@ -17,7 +17,7 @@ from rsfstudy.reporting import (
     build_summary_tables_and_sentences,
     classify_file_contents,
     describe_dataset_origin,
-    summarise_file_as_fields,
+    summarise_file_as_json_fields,
 )
 from rsfstudy.status import Status
 
@@ -51,7 +51,7 @@ class FileSummary(CommandResult):
 
     def to_json_fields(self) -> Mapping[str, Any]:
         """Return the fields of the JSON output."""
-        return summarise_file_as_fields(self.dataset, self.file_path)
+        return summarise_file_as_json_fields(self.dataset, self.file_path)
 
 
 def print_file_summary(summary: FileSummary) -> None:

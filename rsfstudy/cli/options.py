@@ -132,7 +132,7 @@ def combine_option_decorators(
     )
 
 
-def make_count_option(
+def make_positive_integer_option(
     option_name: str, default: int | None, help_text: str
 ) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option whose value is a positive integer.
@@ -215,7 +215,7 @@ engine_option = click.option(
     "[default: engine set by the study, otherwise scipy]",
 )
 
-evaluation_budget_option = make_count_option(
+evaluation_budget_option = make_positive_integer_option(
     "--budget",
     None,
     "Maximum number of right-hand-side evaluations per cell. If you increase the maximum, "
@@ -225,7 +225,7 @@ evaluation_budget_option = make_count_option(
 quiet_option = click.option("--quiet", is_flag=True, help="Do not show progress.")
 #: Options of the worker pool that computes the cells.
 worker_pool_options = combine_option_decorators(
-    make_count_option("--workers", 2, "Number of worker processes on this computer."),
+    make_positive_integer_option("--workers", 2, "Number of worker processes on this computer."),
     click.option(
         "--serial",
         is_flag=True,
@@ -358,7 +358,7 @@ def _check_image_path(
     return value
 
 
-def make_image_option(
+def make_image_path_option(
     option_name: str, default: Path | None, help_text: str
 ) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option for the path of an image file.

@@ -17,7 +17,7 @@ from rsfstudy.cli.options import (
 from rsfstudy.errors import InvalidValue
 
 #: Names of command-line options that are passed unchanged to the functions that read records.
-_READING_OPTIONS_PASSED_UNCHANGED = ("decimal", "sheet", "area", "begin", "end", "thin", "filter")
+_OPTIONS_PASSED_TO_RECORD_READERS = ("decimal", "sheet", "area", "begin", "end", "thin", "filter")
 
 
 def _parse_number_or_text(
@@ -29,7 +29,7 @@ def _parse_number_or_text(
     return None if text is None else parse_number_or_text(text)
 
 
-def make_quantity_option(
+def make_number_with_units_option(
     option_name: str, help_text: str, default: str | None = None
 ) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option for a number with units.
@@ -85,11 +85,11 @@ record_reading_options = combine_option_decorators(
         help="Numbers of the first and last rows to read, counted from 1. Example: 100,4000.  "
         "[default: all rows]",
     ),
-    make_quantity_option(
+    make_number_with_units_option(
         "--begin",
         "Time or load point displacement at which reading begins. Examples: '100 s' or '2 mm'.",
     ),
-    make_quantity_option(
+    make_number_with_units_option(
         "--end",
         "Time or load point displacement at which reading ends. Examples: '100 s' or '2 mm'.",
     ),
@@ -137,12 +137,14 @@ def collect_record_reading_options(command_options: CommandOptions) -> dict[str,
     return {
         "columns": parse_column_assignments(command_options.columns),
         "normal_stress": command_options.normal_stress,
-        "rows": None if command_options.rows is None else _parse_row_numbers(command_options.rows),
-        **command_options.collect_option_values(*_READING_OPTIONS_PASSED_UNCHANGED),
+        "rows": None
+        if command_options.rows is None
+        else _parse_first_and_last_row(command_options.rows),
+        **command_options.collect_option_values(*_OPTIONS_PASSED_TO_RECORD_READERS),
     }
 
 
-def _parse_row_numbers(text: str) -> tuple[int, ...]:
+def _parse_first_and_last_row(text: str) -> tuple[int, ...]:
     """Convert the value of the option ``--rows``."""
     numbers = [part.strip() for part in text.split(",")]
     if not all(number.isdecimal() and len(number) < 16 for number in numbers):

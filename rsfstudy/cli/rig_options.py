@@ -47,7 +47,7 @@ MEANINGS_OF_RIG_OPTIONS = {
 }
 
 
-def describe_rig_option(name: str) -> str:
+def describe_rig_option(option_name: str) -> str:
     """Return the help text of a rig option.
 
     Parameters
@@ -60,5 +60,8 @@ def describe_rig_option(name: str) -> str:
     str
         Help text with the meaning and an example value.
     """
-    meaning, example = MEANINGS_OF_RIG_OPTIONS[name], EXAMPLE_VALUES_OF_RIG_OPTIONS[name]
+    meaning, example = (
+        MEANINGS_OF_RIG_OPTIONS[option_name],
+        EXAMPLE_VALUES_OF_RIG_OPTIONS[option_name],
+    )
     return f"Rig parameter: {meaning}. Numbers without units are in SI units. Example: '{example}'."

@@ -48,7 +48,7 @@ class StudyDeclaration(CommandResult):
         """Names of the scene fields and measure fields that differ between cells."""
         varied = {field for axis in self.study.axes for field in axis.fields}
         if self.study.axis_unit_converter:
-            scales = self.study.axis_unit_converter.compute_scale_and_field_coordinates()
+            scales = self.study.axis_unit_converter.compute_scale_and_scene_coordinates()
             varied |= {name for name, (dims, _values) in scales.items() if dims}
         return varied
 

@@ -24,7 +24,7 @@ from rsfstudy.reporting import (
     build_failed_cells_table,
     count_pending_cells,
     format_verdict_counts,
-    summarise_study_as_fields,
+    summarise_study_as_json_fields,
 )
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Claim
@@ -84,7 +84,7 @@ class StudyResults:
         dict of str to object
             Number of cells by status, reductions, missing reductions and failed cells.
         """
-        return summarise_study_as_fields(self.dataset, self.file_path)
+        return summarise_study_as_json_fields(self.dataset, self.file_path)
 
 
 def collect_verdicts(study_results: Sequence[StudyResults]) -> pd.DataFrame:
@@ -110,7 +110,7 @@ def collect_verdicts(study_results: Sequence[StudyResults]) -> pd.DataFrame:
     return together.assign(number=number).sort_values("number", kind="stable")
 
 
-def verdicts_to_json(verdicts: pd.DataFrame, study_name: str = "") -> list[dict[str, Any]]:
+def convert_verdicts_to_json(verdicts: pd.DataFrame, study_name: str = "") -> list[dict[str, Any]]:
     """Convert verdicts to entries of the JSON output.
 
     Parameters

@@ -55,7 +55,7 @@ def _print_table(table: TextTable) -> None:
     most = [max(map(cell_len, (h, *c))) for h, c in zip(heads, columns, strict=True)]
     room = stdout_console.width - _CHARACTERS_BETWEEN_COLUMNS * (len(heads) - 1)
     if sum(least) > room:
-        for row, style in zip(rows, table.last_cell_colours or [""] * len(rows), strict=True):
+        for row, style in zip(rows, table.last_column_colours or [""] * len(rows), strict=True):
             _print_row_as_list(row, prose, style)
         return
     printed = rich_table.Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
@@ -64,7 +64,7 @@ def _print_table(table: TextTable) -> None:
     for head, column, width in zip(heads, columns, widths, strict=True):
         side = "right" if all(map(_is_number_or_dash, column)) else "left"
         printed.add_column(Text(head), width=width, justify=side)  # type: ignore[arg-type]
-    for row, style in zip(rows, table.last_cell_colours or [""] * len(rows), strict=True):
+    for row, style in zip(rows, table.last_column_colours or [""] * len(rows), strict=True):
         *texts, last = row.values()
         printed.add_row(*map(Text, texts), Text(last, style=style))
     stdout_console.print(printed)

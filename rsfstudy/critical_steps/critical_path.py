@@ -54,7 +54,7 @@ _MAX_EVALUATIONS_OF_PATH_START_SEARCH = 1_500
 _MIN_LOG_SLIP_RATE_OF_CRITICAL_PATH = -230.0
 #: Minimum excess of ln V over the instability norm. A path with a larger excess is considered to
 #: touch the norm from above.
-_LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM = 1e-6
+_MIN_LOG_RATE_EXCESS_OVER_NORM = 1e-6
 
 
 class CriticalPath(NamedTuple):
@@ -85,7 +85,7 @@ class CriticalPath(NamedTuple):
     """
 
     log_slip_rate_at_instability_norm: float
-    frictional_stress_at_zero_normal_stress: float
+    min_frictional_stress: float
     radiated_stress_at_instability_norm: float
     spring_stress_and_states_after_step: FloatTuple
     scene_parameter_values: FloatTuple
@@ -163,7 +163,7 @@ class CriticalPath(NamedTuple):
             return None
         g, psi = self.tangency_point_solver(
             self.log_slip_rate_at_instability_norm,
-            (1.0 - 1e-6) * self.frictional_stress_at_zero_normal_stress,
+            (1.0 - 1e-6) * self.min_frictional_stress,
             self.scene_parameter_values,
         )
         return None if math.isnan(g) else (g + self.radiated_stress_at_instability_norm, psi)
@@ -288,7 +288,7 @@ class CriticalPath(NamedTuple):
                 return event.point.log_slip_rate - self.log_slip_rate_at_instability_norm
         return None
 
-    def next_peak_exceeds_norm(self, local_tolerance: float) -> bool:
+    def next_peak_exceeds_instability_norm(self, local_tolerance: float) -> bool:
         """Return True if the next peak of ln V exceeds the instability norm.
 
         If the next peak of ln V exceeds the instability norm, other motions may reach the norm at
@@ -307,7 +307,7 @@ class CriticalPath(NamedTuple):
         """
         beyond = rise(
             "log_slip_rate",
-            self.log_slip_rate_at_instability_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM,
+            self.log_slip_rate_at_instability_norm + _MIN_LOG_RATE_EXCESS_OVER_NORM,
         )
         for event in self._iterate_events_after_fall_below_load_rate(local_tolerance, beyond):
             if event.kind in (EventKind.RISE, EventKind.MAXIMUM):
@@ -346,7 +346,7 @@ def _build_events_ending_path_start_search(
     log_slip_rate_at_norm: float,
 ) -> tuple[EventSpecification, ...]:
     """Return the events at which the search for the start of a path fails."""
-    above_norm = log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM
+    above_norm = log_slip_rate_at_norm + _MIN_LOG_RATE_EXCESS_OVER_NORM
     return (
         rise("log_slip_rate", above_norm, terminal=True, may_report_later=True),
         fall(
@@ -407,7 +407,7 @@ def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Numer
 
 @cache
 def build_motion_point_evaluator(
-    rate_function: NumericFunction, point_function: NumericFunction
+    rate_function: NumericFunction, motion_point_function: NumericFunction
 ) -> NumericFunction:
     """Build a function ``(state, p) -> MotionPoint`` that evaluates a point.
 
@@ -425,7 +425,7 @@ def build_motion_point_evaluator(
     """
 
     def at(state: FloatTuple, p: FloatTuple) -> MotionPoint:
-        now: MotionPoint = point_function(state, rate_function(state, p), p)
+        now: MotionPoint = motion_point_function(state, rate_function(state, p), p)
         return now
 
     return at

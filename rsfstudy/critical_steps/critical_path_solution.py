@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.loading_step_families import (
-    LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT,
+    LOOSE_INTEGRATION_TOLERANCE,
     LoadingStepFamily,
 )
 from rsfstudy.critical_steps.slow_manifold_accuracy import estimate_slow_manifold_relative_error
@@ -47,11 +47,11 @@ class CriticalStepSizeEstimate:
 
     step_size: float
     relative_error: float
-    found_from_forward_motions: bool = False
-    found_from_limit_cycle: bool = False
+    uses_forward_integration: bool = False
+    limit_cycle_touches_instability_norm: bool = False
 
 
-def find_critical_size_by_critical_path(
+def find_critical_step_size_by_critical_path(
     step_family: LoadingStepFamily, integrator: Integrator
 ) -> CriticalStepSizeEstimate | None:
     """Find the critical step size from the critical path.
@@ -71,8 +71,8 @@ def find_critical_size_by_critical_path(
     CriticalStepSizeEstimate or None
         The boundary, or None if there is no critical path or if smaller steps may be unstable.
     """
-    boundary = _find_critical_size_with_error(
-        step_family, step_family.iterate_sizes_by_critical_path, integrator
+    boundary = _find_critical_step_size_with_error(
+        step_family, step_family.iterate_step_sizes_by_critical_path, integrator
     )
     if boundary is None or not step_family.motions_after_smaller_steps_decay(boundary.step_size):
         return None
@@ -84,14 +84,14 @@ def find_critical_size_by_critical_path(
         return boundary
     return (
         None
-        if CriticalPath.from_scene(scene, integrator).next_peak_exceeds_norm(
-            LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT
+        if CriticalPath.from_scene(scene, integrator).next_peak_exceeds_instability_norm(
+            LOOSE_INTEGRATION_TOLERANCE
         )
         else boundary
     )
 
 
-def find_critical_size_by_limit_cycle(
+def find_critical_step_size_by_limit_cycle(
     step_family: LoadingStepFamily, integrator: Integrator
 ) -> CriticalStepSizeEstimate | None:
     """Find the step size at which a limit cycle touches the instability norm.
@@ -117,17 +117,17 @@ def find_critical_size_by_limit_cycle(
     )
     if large >= 0.0 or small - large < integrator.result_tolerance(10.0):
         return None
-    boundary = _find_critical_size_with_error(
-        step_family, step_family.iterate_sizes_by_limit_cycle, integrator
+    boundary = _find_critical_step_size_with_error(
+        step_family, step_family.iterate_step_sizes_by_limit_cycle, integrator
     )
     # A limit cycle attracts nearby motions weakly, so the errors of two runs may be similar.
     error = 5.0 * boundary.relative_error if boundary else math.nan
     return boundary and replace(boundary, relative_error=error, found_from_limit_cycle=True)
 
 
-def _find_critical_size_with_error(
+def _find_critical_step_size_with_error(
     step_family: LoadingStepFamily,
-    iterate_sizes_by_tolerance: Callable[[Iterable[float], Integrator], Iterator[float]],
+    iterate_step_sizes_by_tolerance: Callable[[Iterable[float], Integrator], Iterator[float]],
     integrator: Integrator,
 ) -> CriticalStepSizeEstimate | None:
     """Find a boundary, and estimate its error from runs with several tolerances.
@@ -144,7 +144,9 @@ def _find_critical_size_with_error(
         else 0.0
     )
     for size, refined in itertools.pairwise(
-        iterate_sizes_by_tolerance(_iterate_decreasing_local_tolerances(integrator), integrator)
+        iterate_step_sizes_by_tolerance(
+            _iterate_decreasing_local_tolerances(integrator), integrator
+        )
     ):
         if not step_family.min_size <= size <= step_family.max_size:
             break

@@ -24,8 +24,8 @@ from scipy.optimize import toms748
 from rsfstudy.critical_steps import motion_after_step, stability_after_step
 from rsfstudy.critical_steps.critical_path_solution import (
     CriticalStepSizeEstimate,
-    find_critical_size_by_critical_path,
-    find_critical_size_by_limit_cycle,
+    find_critical_step_size_by_critical_path,
+    find_critical_step_size_by_limit_cycle,
 )
 from rsfstudy.critical_steps.loading_checks import (
     SLOW_INSTABILITY_NORM_WARNING_PREFIX,
@@ -39,7 +39,7 @@ from rsfstudy.critical_steps.loading_step_types import (
     LoadVelocityStepFamily,
     NormalStressStepFamily,
 )
-from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
+from rsfstudy.critical_steps.slow_manifold_accuracy import is_slow_manifold_inaccurate
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
@@ -59,18 +59,18 @@ STEP_DIRECTIONS = ("up", "down")
 SCENE_FIELD_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Largest relative tolerance for the step size at which a limit cycle touches the instability norm.
-_MAX_STEP_SIZE_RTOL_BY_LIMIT_CYCLE = 1e-8
+_MAX_RTOL_OF_LIMIT_CYCLE_STEP_SIZE = 1e-8
 
 #: Maximum width of a bracket that confirms a critical step, relative to the step size.
-_MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE = 0.02
+_MAX_BRACKET_WIDTH_OVER_STEP_SIZE = 0.02
 
 #: Excess over the instability norm above which the first peak of a motion exceeds the norm before
 #: the motion can approach a limit cycle.
-_MIN_NORM_EXCESS_REACHED_AT_FIRST_PEAK = 0.1
+_MIN_FIRST_PEAK_ABOVE_INSTABILITY_NORM = 0.1
 
 #: Instability norm (limit of the dimensionless slip rate) at which the effect of inertia is
 #: negligible.
-_INSTABILITY_NORM_WITH_NEGLIGIBLE_INERTIA = 1e-3
+_MAX_INSTABILITY_NORM_WITHOUT_INERTIA = 1e-3
 
 #: The measure ``LinearStability`` has an output of the same name, which includes inertia and
 #: radiation damping.
@@ -248,7 +248,7 @@ class CriticalStep(Measure):
             rate = 0.0 if self.of == "load_velocity_ratio" else steps.scene.load_velocity
             return build_norm_below_load_velocity_outcome(scene, rate)
         below = (
-            not stability_after_step.may_have_closed_orbits(scene)
+            not stability_after_step.has_closed_orbits_at_critical_stiffness(scene)
             or stability_after_step.compute_stiffness_ratio_after_step(scene) < 1.0
         )
         if (
@@ -265,33 +265,33 @@ class CriticalStep(Measure):
             )
         if not scene.critical_stiffness:
             # Perturbations do not grow, so only the step itself can reach the norm.
-            return self._search_critical_step_upward(steps, integrator)
-        if not inertia_matters_below_norm(scene, integrator):
+            return self._search_with_increasing_step_size(steps, integrator)
+        if not is_slow_manifold_inaccurate(scene, integrator):
             # A limit cycle attracts nearby paths weakly, so its boundary needs a smaller tolerance.
-            tight = integrator.tightened_to(_MAX_STEP_SIZE_RTOL_BY_LIMIT_CYCLE)
+            tight = integrator.tightened_to(_MAX_RTOL_OF_LIMIT_CYCLE_STEP_SIZE)
             for find, own in (
-                (find_critical_size_by_critical_path, integrator),
-                (find_critical_size_by_limit_cycle, tight),
+                (find_critical_step_size_by_critical_path, integrator),
+                (find_critical_step_size_by_limit_cycle, tight),
             ):
                 boundary = find(steps, own)
-                if boundary is not None and not steps.inertia_shifts_critical_size(
+                if boundary is not None and not steps.inertia_shifts_critical_step_size(
                     boundary.step_size, own.result_tolerance()
                 ):
-                    outcome = self._confirm_critical_size_by_motions(steps, boundary, own)
+                    outcome = self._confirm_critical_step_by_simulation(steps, boundary, own)
                     if outcome.status is Status.OK:
                         return outcome
-            return self._search_critical_step_upward(steps, integrator)
-        near = _compute_critical_size_without_inertia(steps, integrator)
+            return self._search_with_increasing_step_size(steps, integrator)
+        near = _compute_massless_critical_step_size(steps, integrator)
         if near is not None and steps.motions_after_smaller_steps_decay(near):
-            bracket = _bracket_critical_log_size(steps, near, integrator)
+            bracket = _bracket_log_of_critical_step_size(steps, near, integrator)
             if bracket is not None:
-                return self._refine_size_bracket(steps, bracket, integrator)
-        return self._search_critical_step_upward(steps, integrator)
+                return self._refine_step_size_bracket(steps, bracket, integrator)
+        return self._search_with_increasing_step_size(steps, integrator)
 
-    def _confirm_critical_size_by_motions(
+    def _confirm_critical_step_by_simulation(
         self,
         step_family: LoadingStepFamily,
-        critical_size_estimate: CriticalStepSizeEstimate,
+        step_size_estimate: CriticalStepSizeEstimate,
         integrator: Integrator,
     ) -> Outcome:
         """Confirm a critical step with motions after a smaller and a larger step.
@@ -305,48 +305,46 @@ class CriticalStep(Measure):
         step may be critical, because oscillations below the instability norm may grow.
         """
         first = (
-            critical_size_estimate.relative_error
-            if critical_size_estimate.found_from_forward_motions
-            else 3.0 * critical_size_estimate.relative_error
+            step_size_estimate.relative_error
+            if step_size_estimate.uses_forward_integration
+            else 3.0 * step_size_estimate.relative_error
         )
         first = width = max(first, integrator.result_tolerance())
-        while width < _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
+        while width < _MAX_BRACKET_WIDTH_OVER_STEP_SIZE:
             inner, outer = (
-                critical_size_estimate.step_size * (1.0 - width),
-                critical_size_estimate.step_size * (1.0 + width),
+                step_size_estimate.step_size * (1.0 - width),
+                step_size_estimate.step_size * (1.0 + width),
             )
             below, above = (
-                _compute_excess_over_norm_after_step(step_family, size, integrator)
+                _compute_log_rate_above_norm_after_step(step_family, size, integrator)
                 for size in (inner, outer)
             )
             if below is not None and above is not None and above >= 0.0 > below:
-                at_once = width == first and not critical_size_estimate.found_from_forward_motions
-                relative = critical_size_estimate.relative_error if at_once else width
+                at_once = width == first and not step_size_estimate.uses_forward_integration
+                relative = step_size_estimate.relative_error if at_once else width
                 error = step_family.compute_field_value_error(
-                    critical_size_estimate.step_size, relative
+                    step_size_estimate.step_size, relative
                 )
                 values = self._build_output_values(
                     step_family,
-                    critical_size_estimate.step_size,
+                    step_size_estimate.step_size,
                     error,
                     step_family.step_size_to_field_value(inner),
                     step_family.step_size_to_field_value(outer),
                 )
-                load = step_family.build_scene_with_step(
-                    critical_size_estimate.step_size
-                ).load_velocity
+                load = step_family.build_scene_with_step(step_size_estimate.step_size).load_velocity
                 return Outcome(
                     Status.OK, values, build_slow_instability_norm_warning(step_family.scene, load)
                 )
             if not (
-                critical_size_estimate.found_from_forward_motions
-                or critical_size_estimate.found_from_limit_cycle
+                step_size_estimate.uses_forward_integration
+                or step_size_estimate.limit_cycle_touches_instability_norm
             ):
                 break
             if (
-                critical_size_estimate.found_from_limit_cycle
+                step_size_estimate.limit_cycle_touches_instability_norm
                 and below is not None
-                and below > _MIN_NORM_EXCESS_REACHED_AT_FIRST_PEAK
+                and below > _MIN_FIRST_PEAK_ABOVE_INSTABILITY_NORM
             ):
                 break
             width *= 10.0
@@ -355,7 +353,7 @@ class CriticalStep(Measure):
             self._build_output_values(step_family),
             "a stable and an unstable step within 2 % could not be found for "
             f"{self.primary_output} = "
-            f"{step_family.step_size_to_field_value(critical_size_estimate.step_size):.9g}",
+            f"{step_family.step_size_to_field_value(step_size_estimate.step_size):.9g}",
         )
 
     def _build_output_values(
@@ -377,7 +375,7 @@ class CriticalStep(Measure):
             **step_family.compute_extra_output_values(step_size),
         }
 
-    def _search_critical_step_upward(
+    def _search_with_increasing_step_size(
         self, step_family: LoadingStepFamily, integrator: Integrator
     ) -> Outcome:
         """Find the critical step from motions after steps of increasing size.
@@ -416,12 +414,12 @@ class CriticalStep(Measure):
                 f"even a step to {step_family.step_size_to_field_value(step_family.min_size):.6g} "
                 "is unstable",
             )
-        return self._refine_size_bracket(step_family, (stable, unstable), integrator)
+        return self._refine_step_size_bracket(step_family, (stable, unstable), integrator)
 
-    def _refine_size_bracket(
+    def _refine_step_size_bracket(
         self,
         step_family: LoadingStepFamily,
-        log_size_bracket: tuple[float, float],
+        log_step_size_bracket: tuple[float, float],
         integrator: Integrator,
     ) -> Outcome:
         """Find the critical step size between a stable and an unstable step size.
@@ -429,7 +427,7 @@ class CriticalStep(Measure):
         The excess of ln V over the instability norm changes sign at the critical step size. If a
         motion cannot continue, the result is the centre of the remaining interval of ln(step size).
         """
-        stable, unstable = log_size_bracket
+        stable, unstable = log_step_size_bracket
         tolerance = max(
             step_family.compute_step_size_tolerance(
                 math.exp(unstable), integrator.result_tolerance()
@@ -440,7 +438,7 @@ class CriticalStep(Measure):
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
-            found = motion_after_step.compute_log_rate_excess_over_norm(
+            found = motion_after_step.compute_log_rate_above_instability_norm(
                 step_family.build_scene_with_step(math.exp(log_size)), integrator
             )
             if found >= 0.0:
@@ -450,13 +448,13 @@ class CriticalStep(Measure):
             return found
 
         try:
-            log_size = toms748(excess, *log_size_bracket, xtol=0.5 * tolerance, rtol=1e-15)
+            log_size = toms748(excess, *log_step_size_bracket, xtol=0.5 * tolerance, rtol=1e-15)
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
-            if unstable - stable > _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
+            if unstable - stable > _MAX_BRACKET_WIDTH_OVER_STEP_SIZE:
                 return self._build_outcome_without_critical_step(
-                    step_family, math.exp(log_size_bracket[0]), integrator, f", because {halt}"
+                    step_family, math.exp(log_step_size_bracket[0]), integrator, f", because {halt}"
                 )
             log_size = 0.5 * (stable + unstable)
         # Motions with the same tolerances would repeat the same errors, so the verification uses
@@ -466,13 +464,15 @@ class CriticalStep(Measure):
             tolerance + step_family.estimate_error_near_neutral_stability(size, tolerance),
             unstable - stable,
         )
-        boundary = CriticalStepSizeEstimate(size, error, found_from_forward_motions=True)
-        return self._confirm_critical_size_by_motions(step_family, boundary, integrator.refined())
+        boundary = CriticalStepSizeEstimate(size, error, uses_forward_integration=True)
+        return self._confirm_critical_step_by_simulation(
+            step_family, boundary, integrator.refined()
+        )
 
     def _build_outcome_without_critical_step(
         self,
         step_family: LoadingStepFamily,
-        largest_size: float,
+        largest_step_size: float,
         integrator: Integrator,
         reason: str = "",
     ) -> Outcome:
@@ -484,13 +484,13 @@ class CriticalStep(Measure):
         """
         if (
             step_family.scene.has_mass
-            and _compute_critical_size_without_inertia(step_family, integrator) is not None
+            and _compute_massless_critical_step_size(step_family, integrator) is not None
         ):
             return Outcome(
                 Status.NORM_UNREACHABLE,
                 self._build_output_values(
                     step_family,
-                    stable_field_value=step_family.step_size_to_field_value(largest_size),
+                    stable_field_value=step_family.step_size_to_field_value(largest_step_size),
                 ),
                 "inertia keeps the slip rate below the instability norm "
                 f"{step_family.scene.instability_norm:g}",
@@ -500,11 +500,11 @@ class CriticalStep(Measure):
             and not step_family.scene.has_mass
             and not reason
         ):
-            value = step_family.step_size_to_field_value(largest_size)
+            value = step_family.step_size_to_field_value(largest_step_size)
             values = self._build_output_values(
                 step_family,
-                largest_size,
-                largest_size * Accuracy.RELATIVE_ROUNDING_ERROR,
+                largest_step_size,
+                largest_step_size * Accuracy.RELATIVE_ROUNDING_ERROR,
                 value,
                 value,
             )
@@ -514,14 +514,15 @@ class CriticalStep(Measure):
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,
             self._build_output_values(
-                step_family, stable_field_value=step_family.step_size_to_field_value(largest_size)
+                step_family,
+                stable_field_value=step_family.step_size_to_field_value(largest_step_size),
             ),
             f"stable for every step {'up' if self.direction == 'up' else 'down'} to "
-            f"{step_family.step_size_to_field_value(largest_size):.6g}{reason}",
+            f"{step_family.step_size_to_field_value(largest_step_size):.6g}{reason}",
         )
 
 
-def _compute_excess_over_norm_after_step(
+def _compute_log_rate_above_norm_after_step(
     step_family: LoadingStepFamily, step_size: float, integrator: Integrator
 ) -> float | None:
     """Compute the excess of ln V over the norm after a step of a given size.
@@ -529,7 +530,7 @@ def _compute_excess_over_norm_after_step(
     The result is None if the motion cannot continue.
     """
     try:
-        return motion_after_step.compute_log_rate_excess_over_norm(
+        return motion_after_step.compute_log_rate_above_instability_norm(
             step_family.build_scene_with_step(step_size), integrator
         )
     except MotionStopped as halt:
@@ -538,24 +539,24 @@ def _compute_excess_over_norm_after_step(
         return None
 
 
-def _compute_critical_size_without_inertia(
+def _compute_massless_critical_step_size(
     step_family: LoadingStepFamily, integrator: Integrator
 ) -> float | None:
     """Compute the critical step for an instability norm with negligible inertia.
 
     The estimate requires few evaluations. The result is None if there is no critical path.
     """
-    norm = min(step_family.scene.instability_norm, _INSTABILITY_NORM_WITH_NEGLIGIBLE_INERTIA)
+    norm = min(step_family.scene.instability_norm, _MAX_INSTABILITY_NORM_WITHOUT_INERTIA)
     massless = type(step_family)(
         step_family.scene.without_mass().with_(instability_norm=norm), step_family.sign
     )
     if massless.max_size <= massless.min_size or not massless.scene.critical_stiffness:
         return None
-    return next(massless.iterate_sizes_by_critical_path((1e-6,), integrator), None)
+    return next(massless.iterate_step_sizes_by_critical_path((1e-6,), integrator), None)
 
 
-def _bracket_critical_log_size(
-    step_family: LoadingStepFamily, size_guess: float, integrator: Integrator
+def _bracket_log_of_critical_step_size(
+    step_family: LoadingStepFamily, step_size_guess: float, integrator: Integrator
 ) -> tuple[float, float] | None:
     """Find a stable and an unstable step size around a guess.
 
@@ -563,9 +564,9 @@ def _bracket_critical_log_size(
     stable, the search tests sizes up to 1.37 times the guess. The result is None if the search
     finds no bracket.
     """
-    middle = math.log(size_guess)
+    middle = math.log(step_size_guess)
     reached = motion_after_step.motion_reaches_instability_norm(
-        step_family.build_scene_with_step(size_guess), integrator
+        step_family.build_scene_with_step(step_size_guess), integrator
     )
     inner, reach = middle, 1e-4
     while reach < 1.5:

@@ -11,7 +11,7 @@ from rsfstudy.status import Status
 
 #: Minimum ratio of the slip rate at the instability norm to the load point velocity. If the ratio
 #: is lower, the slip rate may reach the instability norm without an instability.
-_MIN_NORM_OVER_LOAD_VELOCITY = 1e3
+_MIN_INSTABILITY_NORM_OVER_LOAD_VELOCITY = 1e3
 #: Beginning of the warning that the instability norm is a slow slip rate.
 SLOW_INSTABILITY_NORM_WARNING_PREFIX = "the instability norm "
 
@@ -89,7 +89,7 @@ def build_slow_instability_norm_warning(scene: Scene, load_velocity: float) -> s
     """
     rate, load = math.exp(scene.log_instability_rate), max(1.0, abs(load_velocity))
     if (
-        rate >= _MIN_NORM_OVER_LOAD_VELOCITY * load
+        rate >= _MIN_INSTABILITY_NORM_OVER_LOAD_VELOCITY * load
         or scene.reference_rate == SliderParameters.reference_rate
     ):
         return ""
@@ -97,6 +97,6 @@ def build_slow_instability_norm_warning(scene: Scene, load_velocity: float) -> s
         f"{SLOW_INSTABILITY_NORM_WARNING_PREFIX}{scene.instability_norm:g} corresponds to a slip "
         f"rate of {rate:.3g} V_*, which is only {rate / load:.3g} times the load point velocity. "
         "A motion that reaches this slip rate may be stable. Use a slip rate above "
-        f"{_MIN_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*. For a rig, pass the slip rate with "
+        f"{_MIN_INSTABILITY_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*. For a rig, pass the slip rate with "
         "units, for example rig.scene(instability_norm='10 mm/s')"
     )

@@ -25,14 +25,14 @@ from rsfstudy.slider import Scene
 #: size to the largest step size.
 MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
 #: Increase of the largest step, in units of ln V, if inertia delays the rise of slip rate.
-LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA = 5.0
+LOG_INCREASE_OF_MAX_STEP_BY_INERTIA = 5.0
 #: The effect of inertia on the critical step size is neglected if the effect is less than this
 #: fraction of the requested accuracy.
 MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL = 0.01
 #: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
 _COUNT_OF_STEP_SIZES_TESTED_FOR_STABILITY = 24
 #: Local tolerance of the integrations for the approximate root of the misfit.
-LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT = 1e-5
+LOOSE_INTEGRATION_TOLERANCE = 1e-5
 #: Smallest and largest difference of ln(step size) over which the slope of the misfit is computed.
 #: If a correction of the approximate root exceeds the largest difference of ln(step size), the
 #: refinement of the root ends.
@@ -42,7 +42,7 @@ _MAX_SECANT_ITERATIONS = 8
 #: change in the misfit.
 _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
 #: Number of successive step sizes without a critical path after which the search is abandoned.
-_MAX_SEARCH_STRIDES_WITHOUT_CRITICAL_PATH = 3
+_MAX_STEP_SIZES_WITHOUT_CRITICAL_PATH = 3
 
 
 class LoadingStepFamily:
@@ -78,7 +78,7 @@ class LoadingStepFamily:
     def __init__(self, scene: Scene, sign: int) -> None:
         self.scene, self.sign = scene, sign
         self._scenes_by_step_size: dict[float, Scene] = {}
-        self.max_size = self._compute_max_size() * (1.0 - 1e-9)
+        self.max_size = self._compute_max_step_size() * (1.0 - 1e-9)
         self.min_size = min(MIN_STEP_SIZE, _MIN_SIZE_FRACTION * self.max_size)
 
     def build_scene_with_step(self, step_size: float) -> Scene:
@@ -178,7 +178,7 @@ class LoadingStepFamily:
         """
         return {}
 
-    def iterate_sizes_by_critical_path(
+    def iterate_step_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield estimates of the step size at which the critical path starts.
@@ -197,7 +197,7 @@ class LoadingStepFamily:
         """
         raise TypeError(f"{type(self).__name__} does not define this method")
 
-    def iterate_sizes_by_limit_cycle(
+    def iterate_step_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield step sizes at which a limit cycle touches the instability norm.
@@ -216,7 +216,7 @@ class LoadingStepFamily:
         """
         return iter(())
 
-    def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
+    def inertia_shifts_critical_step_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the motion after the step reaches the critical path only after a
@@ -282,7 +282,7 @@ class LoadingStepFamily:
             ).tolist()
         return all(is_linearly_stable(self.build_scene_with_step(each)) for each in sizes)
 
-    def _compute_max_size(self) -> float:
+    def _compute_max_step_size(self) -> float:
         raise TypeError(f"{type(self).__name__} does not define this method")
 
 
@@ -335,7 +335,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
         """
         return math.exp(self.sign * step_size) * step_size * step_size_relative_error
 
-    def iterate_sizes_by_critical_path(
+    def iterate_step_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield estimates of the step size at which the critical path starts.
@@ -376,7 +376,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
         """
         return lambda size: CriticalPath.from_scene(self.build_scene_with_step(size), integrator)
 
-    def iterate_sizes_by_limit_cycle(
+    def iterate_step_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield step sizes at which a limit cycle touches the instability norm.
@@ -388,9 +388,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
         found, path_at = dict[float, float](), self.build_critical_path_factory(integrator)
 
         @cache
-        def misfit(
-            log_size: float, tolerance: float = LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT
-        ) -> float:
+        def misfit(log_size: float, tolerance: float = LOOSE_INTEGRATION_TOLERANCE) -> float:
             higher = path_at(math.exp(log_size)).compute_next_peak_height_above_norm(tolerance)
             if higher is None:
                 return math.nan
@@ -419,10 +417,10 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
         def misfit(log_size: float) -> float:
             size = math.exp(log_size)
             state = build_critical_path(size).compute_state_misfit_at_path_start(
-                LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT
+                LOOSE_INTEGRATION_TOLERANCE
             )
             if state is None:
-                return self._find_misfit_sign_without_critical_path(
+                return self._find_misfit_sign_from_motion(
                     self.build_scene_with_step(size), integrator
                 )
             found[log_size] = state
@@ -449,13 +447,13 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
             fraction = min(max(size, self.min_size) / self.max_size, 0.5)
             return math.log(fraction / (1.0 - fraction))
 
-        lowest, guess = position(self.min_size), position(self._guess_critical_size())
+        lowest, guess = position(self.min_size), position(self._guess_critical_step_size())
 
         def outwards(*ways: int) -> tuple[float, float] | None:
             ends = dict.fromkeys(ways, (guess, misfit_function(log_size(guess))))
             last = {1: _MAX_POSITION, -1: lowest}
             stride, failures = 0.2, 0
-            while failures < _MAX_SEARCH_STRIDES_WITHOUT_CRITICAL_PATH and any(
+            while failures < _MAX_STEP_SIZES_WITHOUT_CRITICAL_PATH and any(
                 ends[way][0] != last[way] for way in ways
             ):
                 for way, (at, value) in ends.items():
@@ -481,13 +479,11 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
             return 0
         return int(math.copysign(1.0, misfit_at_guess))
 
-    def _guess_critical_size(self) -> float:
+    def _guess_critical_step_size(self) -> float:
         """Return the step size at which the search starts."""
         raise TypeError(f"{type(self).__name__} does not define this method")
 
-    def _find_misfit_sign_without_critical_path(
-        self, scene: Scene, integrator: Integrator
-    ) -> float:
+    def _find_misfit_sign_from_motion(self, scene: Scene, integrator: Integrator) -> float:
         """Return the sign of the misfit if there is no critical path.
 
         The sign is positive if the motion after the step is stable. The result is NaN if the sign
@@ -533,7 +529,7 @@ def _find_misfit_root(
 
 
 def _refine_misfit_root(
-    log_size: float,
+    log_step_size: float,
     misfit_slope: float,
     local_tolerances: Iterable[float],
     misfit_function: Callable[[float, float], float | None],
@@ -550,17 +546,19 @@ def _refine_misfit_root(
         previous: tuple[float, float] | None = None
         for _ in range(_MAX_SECANT_ITERATIONS):
             # The error of V_0 is the error of its logarithm times V_0.
-            value = misfit_function(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
+            value = misfit_function(
+                math.exp(log_step_size), tolerance / max(1.0, math.exp(log_step_size))
+            )
             if value is None or not math.isfinite(value):
                 return
             if previous is not None and value != previous[1]:
-                misfit_slope = (value - previous[1]) / (log_size - previous[0])
-            previous = log_size, value
-            log_size -= value / misfit_slope
+                misfit_slope = (value - previous[1]) / (log_step_size - previous[0])
+            previous = log_step_size, value
+            log_step_size -= value / misfit_slope
             if abs(value) > _MAX_SLOPE_DISTANCE * abs(misfit_slope):
                 return
             if min(abs(value), abs(value / misfit_slope)) < 30.0 * tolerance:
                 break
         else:
             return
-        yield math.exp(log_size)
+        yield math.exp(log_step_size)

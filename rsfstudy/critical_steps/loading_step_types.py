@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.loading_step_families import (
-    LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT,
-    LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA,
+    LOG_INCREASE_OF_MAX_STEP_BY_INERTIA,
+    LOOSE_INTEGRATION_TOLERANCE,
     MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL,
     MIN_STEP_SIZE,
     LoadingStepFamily,
@@ -23,13 +23,13 @@ from rsfstudy.critical_steps.loading_step_families import (
 from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.critical_steps.stability_after_step import (
     compute_stability_margin,
+    has_closed_orbits_at_critical_stiffness,
     is_linearly_stable,
-    may_have_closed_orbits,
 )
 from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.slider import (
     Scene,
-    compute_effective_friction,
+    compute_coulomb_effective_friction,
 )
 from rsfstudy.status import Status
 
@@ -83,7 +83,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
         """
         return math.exp(self.sign * step_size)
 
-    def _guess_critical_size(self) -> float:
+    def _guess_critical_step_size(self) -> float:
         """Return a guess based on the closed forms of Gu et al. (1984).
 
         The closed forms apply to the slip law.
@@ -91,9 +91,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
         weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_B_OVER_A_MINUS_ONE_IN_SIZE_GUESS)
         return float(np.logaddexp(0.0, self.scene.stiffness_ratio - 1.0 - math.log(weakening)))
 
-    def _find_misfit_sign_without_critical_path(
-        self, scene: Scene, integrator: Integrator
-    ) -> float:
+    def _find_misfit_sign_from_motion(self, scene: Scene, integrator: Integrator) -> float:
         """Return the sign of the misfit, computed by integration forwards in time.
 
         The result is NaN for downward steps.
@@ -102,7 +100,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
             return math.nan
         return -1.0 if _motion_reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
 
-    def _compute_max_size(self) -> float:
+    def _compute_max_step_size(self) -> float:
         """Return the largest step size of the search.
 
         After the largest upward step, the load point velocity corresponds to the instability norm.
@@ -155,7 +153,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         """
         return step_size * step_size_relative_error
 
-    def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
+    def inertia_shifts_critical_step_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the slider follows the critical path with a delay, which changes
@@ -167,7 +165,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         if not scene.has_mass:
             return False
         behind, rate = compute_slip_lag_due_to_inertia(self.build_scene_with_step(step_size))
-        missed = 0.5 * scene.a * scene.parts.law.state_change_over_a / scene.stiffness
+        missed = 0.5 * scene.a * scene.parts.law.state_change_per_log_rate_over_a / scene.stiffness
         loaded = scene.load_velocity / rate if rate else 0.0
         return (
             behind * (loaded + missed)
@@ -202,7 +200,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         )
         return dict(zip(self.extra_output_names, (critical, closed_form), strict=True))
 
-    def iterate_sizes_by_critical_path(
+    def iterate_step_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield the size of the step at which the critical path starts.
@@ -221,7 +219,7 @@ class DisplacementStepFamily(LoadingStepFamily):
                 return
             yield abs(start.spring_stress / self.scene.stiffness)
 
-    def _compute_max_size(self) -> float:
+    def _compute_max_step_size(self) -> float:
         """Return the largest step size of the search.
 
         The largest upward step raises the slip rate to the instability norm immediately. If the
@@ -235,7 +233,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         if self.sign < 0:
             weakest = scene.parts.normal_stress.min_frictional_stress(scene)
             return min(scene.mu_star, -weakest) / scene.stiffness
-        farther = LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
+        farther = LOG_INCREASE_OF_MAX_STEP_BY_INERTIA if scene.has_mass else 0.0
         friction = scene.frictional_stress_after_jump(
             scene.a * (scene.log_instability_rate + farther)
         )
@@ -283,7 +281,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         """
         return math.expm1(self.sign * step_size)
 
-    def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
+    def inertia_shifts_critical_step_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the slip rate rises with a delay after the step. The effect of
@@ -296,7 +294,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
             if scene.has_mass
             else 0.0
         )
-        missed = max(1.0, 0.5 * scene.parts.law.state_change_over_a) * behind
+        missed = max(1.0, 0.5 * scene.parts.law.state_change_per_log_rate_over_a) * behind
         return (
             missed
             > MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL
@@ -315,7 +313,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         """
         scene = self.build_scene_with_step(step_size)
         near = (
-            may_have_closed_orbits(scene)
+            has_closed_orbits_at_critical_stiffness(scene)
             and abs(compute_stability_margin(scene)) < 10.0 * tolerance
         )
         return 2.0 * tolerance / step_size if near else 0.0
@@ -332,7 +330,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         )
         return dict(zip(self.extra_output_names, (rate,), strict=True))
 
-    def _guess_critical_size(self) -> float:
+    def _guess_critical_step_size(self) -> float:
         """Return a guess of the critical step size.
 
         For a decrease in normal stress, the guess is the change in Coulomb stress that reaches the
@@ -343,13 +341,11 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         if self.sign > 0 and 1.0 < scene.stiffness_ratio < math.inf:
             return math.log(scene.stiffness_ratio)
         _follows, alpha = scene.parts.normal_stress.coupling or (0.0, 0.0)
-        friction = compute_effective_friction(scene.mu_star, max(law.b_over_a, 1.0), alpha)
+        friction = compute_coulomb_effective_friction(scene.mu_star, max(law.b_over_a, 1.0), alpha)
         friction = max(abs(friction), _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR * scene.mu_star)
         return scene.a * scene.stiffness_ratio / friction
 
-    def _find_misfit_sign_without_critical_path(
-        self, scene: Scene, integrator: Integrator
-    ) -> float:
+    def _find_misfit_sign_from_motion(self, scene: Scene, integrator: Integrator) -> float:
         """Return the sign of the misfit, computed by integration forwards in time.
 
         The result is NaN for increases in normal stress, or if the motion cannot continue.
@@ -363,7 +359,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
                 raise
             return math.nan
 
-    def _compute_max_size(self) -> float:
+    def _compute_max_step_size(self) -> float:
         """Return the largest step size of the search.
 
         The largest step raises the slip rate to the instability norm immediately. With inertia, the
@@ -376,7 +372,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
             return 0.0
         level = scene.log_instability_rate + (
-            LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
+            LOG_INCREASE_OF_MAX_STEP_BY_INERTIA if scene.has_mass else 0.0
         )
 
         def excess(size: float) -> float:
@@ -431,5 +427,5 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
 
 def _motion_reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:
     """Return True if a motion with a loose tolerance reaches the norm."""
-    loose = replace(integrator.accuracy, rtol=LOCAL_TOLERANCE_OF_FIRST_MISFIT_ROOT, refinement=1.0)
+    loose = replace(integrator.accuracy, rtol=LOOSE_INTEGRATION_TOLERANCE, refinement=1.0)
     return motion_reaches_instability_norm(scene, integrator.with_accuracy(loose))

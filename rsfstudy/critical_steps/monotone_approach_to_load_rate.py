@@ -23,7 +23,7 @@ from rsfstudy.motion import EventSpecification, rise
 from rsfstudy.slider import MotionPoint, Scene
 
 #: Differences ln V_0 - ln V at which the motion is tested for a monotonic rise.
-_TESTED_LOG_DISTANCES_BELOW_LOAD_RATE = (
+_TESTED_LOG_RATES_BELOW_LOAD_RATE = (
     10.0,
     8.0,
     7.0,
@@ -54,7 +54,7 @@ _TESTED_LOG_DISTANCES_BELOW_LOAD_RATE = (
 #: Largest ratio of the change in ln V over a slip of D_c to the difference ln V_0 - ln V. The test
 #: for a monotonic rise is worthwhile only below this ratio, because the integration of such a slow
 #: motion would take hundreds of steps.
-_MAX_GROWTH_OVER_DISTANCE_TO_LOAD_RATE = 0.02
+_MAX_RISE_PER_DC_OVER_LOG_RATE_GAP = 0.02
 
 
 def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]:
@@ -76,14 +76,14 @@ def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:
         return []
-    if not scene.stiffness < _MAX_GROWTH_OVER_DISTANCE_TO_LOAD_RATE * (
+    if not scene.stiffness < _MAX_RISE_PER_DC_OVER_LOG_RATE_GAP * (
         scene.a + scene.dynamics.radiated_stress_slope(load)
     ):
         return []
-    return [rise("log_slip_rate", load - below) for below in _TESTED_LOG_DISTANCES_BELOW_LOAD_RATE]
+    return [rise("log_slip_rate", load - below) for below in _TESTED_LOG_RATES_BELOW_LOAD_RATE]
 
 
-def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
+def is_slip_rate_rise_monotone(scene: Scene, motion_point: MotionPoint) -> bool:
     """Return True if ln V rises monotonically to ln V_0 without overshoot.
 
     The test is based on a finite number of points between the present slip rate and the load point
@@ -103,15 +103,15 @@ def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
         motions at all tested points cross the curves inwards.
     """
     change, load = _build_log_rate_and_state_lag_derivatives(scene), scene.log_load_velocity
-    distance = load - point.log_slip_rate
+    distance = load - motion_point.log_slip_rate
 
     def farthest(x: float) -> float:
         return _LAG_FACTOR * change(x, 0.0)[1]
 
-    lag = point.state - scene.compute_steady_states(point.log_slip_rate, 0.0)[0]
+    lag = motion_point.state - scene.compute_steady_states(motion_point.log_slip_rate, 0.0)[0]
     # The sign of the lag is the sign of b.
     side = math.copysign(1.0, scene.b)
-    if not 0.0 <= side * lag <= side * farthest(point.log_slip_rate):
+    if not 0.0 <= side * lag <= side * farthest(motion_point.log_slip_rate):
         return False
     several = max(2, round(np.log(distance / _MIN_TESTED_DISTANCE) / _MAX_TEST_SPACING))
     for x in (load - np.geomspace(distance, _MIN_TESTED_DISTANCE, several)).tolist():

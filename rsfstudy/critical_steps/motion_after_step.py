@@ -13,16 +13,16 @@ from dataclasses import dataclass
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
     build_events_testing_monotone_rise,
-    rises_monotonically_to_load_rate,
+    is_slip_rate_rise_monotone,
 )
 from rsfstudy.critical_steps.motion_with_held_load_point import (
     compute_peak_log_rate_excess_over_norm,
 )
-from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
+from rsfstudy.critical_steps.slow_manifold_accuracy import is_slow_manifold_inaccurate
 from rsfstudy.critical_steps.stability_after_step import (
     SteadySlidingWithStabilityMargin,
-    compute_steady_sliding_with_margin,
-    may_have_closed_orbits,
+    find_steady_sliding_and_stability_margin,
+    has_closed_orbits_at_critical_stiffness,
 )
 from rsfstudy.motion import (
     EventKind,
@@ -46,12 +46,12 @@ _LEAP_FACTOR, _MIN_LEAP_FACTOR = 1.3, 1.002
 _REQUIRED_EQUAL_PEAKS_IN_A_ROW = 4
 #: Assumed height of the ln V peak above the instability norm, if the motion is integrated only up
 #: to the norm.
-_ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM = 1.0
+_ASSUMED_PEAK_ABOVE_INSTABILITY_NORM = 1.0
 #: A motion has settled if its distance from steady sliding is less than this fraction of the
 #: largest distance from steady sliding during the motion.
-_SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-3
-_SLIP_RATE_PEAK_EVENT = maximum("log_slip_rate")
-_SETTLING_EVENT = approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE)
+_SETTLED_DISTANCE_OVER_MAX_DISTANCE = 1e-3
+_SLIP_RATE_PEAK_SPECIFICATION = maximum("log_slip_rate")
+_SETTLING_EVENT_SPECIFICATION = approach_to_steady_state(_SETTLED_DISTANCE_OVER_MAX_DISTANCE)
 
 
 @dataclass(frozen=True)
@@ -91,10 +91,10 @@ def motion_reaches_instability_norm(scene: Scene, integrator: Integrator) -> boo
     bool
         True if ``compute_log_rate_excess_over_norm`` is not negative.
     """
-    return compute_log_rate_excess_over_norm(scene, integrator) >= 0.0
+    return compute_log_rate_above_instability_norm(scene, integrator) >= 0.0
 
 
-def compute_log_rate_excess_over_norm(scene: Scene, integrator: Integrator) -> float:
+def compute_log_rate_above_instability_norm(scene: Scene, integrator: Integrator) -> float:
     """Compute the excess of ln V over the instability norm after the step.
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
@@ -137,10 +137,10 @@ def compute_log_rate_excess_over_norm(scene: Scene, integrator: Integrator) -> f
     """
     if scene.log_load_velocity == -math.inf:
         return compute_peak_log_rate_excess_over_norm(scene, integrator)
-    steady = compute_steady_sliding_with_margin(scene)
-    norm, heavy = scene.log_instability_rate, inertia_matters_below_norm(scene, integrator)
+    steady = find_steady_sliding_and_stability_margin(scene)
+    norm, heavy = scene.log_instability_rate, is_slow_manifold_inaccurate(scene, integrator)
     if (
-        may_have_closed_orbits(scene)
+        has_closed_orbits_at_critical_stiffness(scene)
         and abs(steady.stability_margin) < integrator.result_tolerance()
     ):
         top = _compute_max_log_rate_of_closed_orbit(scene, integrator)
@@ -150,7 +150,9 @@ def compute_log_rate_excess_over_norm(scene: Scene, integrator: Integrator) -> f
     reached = first.reached_instability_norm
     if first.point_where_growth_was_too_slow is not None:
         at = first.point_where_growth_was_too_slow
-        reached = _slow_orbit_grows_to_norm(scene, steady, at, integrator, with_inertia=heavy)
+        reached = _slow_orbit_grows_to_instability_norm(
+            scene, steady, at, integrator, with_inertia=heavy
+        )
     excess = _compute_peak_excess_of_orbit_over_norm(first, norm, with_inertia=heavy)
     return max(excess, 1e-12) if reached else min(excess, -1e-12)
 
@@ -172,10 +174,10 @@ def _compute_max_log_rate_of_closed_orbit(scene: Scene, integrator: Integrator) 
         equations.evaluate_motion_point(start).log_slip_rate_derivative > 0.0,
         scene.log_instability_rate,
     )
-    specs = (_SLIP_RATE_PEAK_EVENT, minimum("log_slip_rate"), rise("log_slip_rate", norm))
+    specs = (_SLIP_RATE_PEAK_SPECIFICATION, minimum("log_slip_rate"), rise("log_slip_rate", norm))
     for event in integrator.follow_equations(equations, start, specs, backward=not rising):
         if event.kind is EventKind.RISE:
-            return norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM
+            return norm + _ASSUMED_PEAK_ABOVE_INSTABILITY_NORM
         if (
             event.specification is not None
             or event.point.log_slip_rate >= norm
@@ -185,7 +187,7 @@ def _compute_max_log_rate_of_closed_orbit(scene: Scene, integrator: Integrator) 
     raise AssertionError("a motion without a time limit cannot end")
 
 
-def _orbit_touching_norm_shrinks(scene: Scene, integrator: Integrator) -> bool:
+def _orbit_touching_instability_norm_shrinks(scene: Scene, integrator: Integrator) -> bool:
     """Return True if the orbit that touches the instability norm shrinks.
 
     Paths in a plane cannot cross, so no orbit inside a shrinking orbit reaches the norm.
@@ -195,7 +197,7 @@ def _orbit_touching_norm_shrinks(scene: Scene, integrator: Integrator) -> bool:
     return misfit is not None and misfit < -100.0 * integrator.local_tolerance
 
 
-def _slow_orbit_grows_to_norm(
+def _slow_orbit_grows_to_instability_norm(
     scene: Scene,
     steady_state: SteadySlidingWithStabilityMargin,
     start_point: MotionPoint,
@@ -209,7 +211,7 @@ def _slow_orbit_grows_to_norm(
     norm. If the first peak of ln V on the next orbit is above the instability norm, the size of the
     next orbit is reduced.
     """
-    if not with_inertia and _orbit_touching_norm_shrinks(scene, integrator):
+    if not with_inertia and _orbit_touching_instability_norm_shrinks(scene, integrator):
         return False
     leap = _LEAP_FACTOR
     while True:
@@ -254,7 +256,7 @@ def _follow_one_orbit(
     if levels and not steady_state.is_stable:
         levels = []
     reaches_norm = [] if with_inertia else [rise("log_slip_rate", norm)]
-    specs = [_SLIP_RATE_PEAK_EVENT, *reaches_norm, _SETTLING_EVENT, *levels]
+    specs = [_SLIP_RATE_PEAK_SPECIFICATION, *reaches_norm, _SETTLING_EVENT_SPECIFICATION, *levels]
     planar, repeating = (
         scene.state_count == 1,
         _CycleRepetitionDetector(scene, steady_state, integrator),
@@ -274,13 +276,13 @@ def _follow_one_orbit(
             elif top >= norm and not with_inertia:
                 return _OrbitOutcome((top,), reached_instability_norm=True)
         elif event.specification in levels:
-            if rises_monotonically_to_load_rate(scene, event.point):
+            if is_slip_rate_rise_monotone(scene, event.point):
                 return _OrbitOutcome(
                     tuple(peaks), reached_instability_norm=False, initial_log_slip_rate=at_start
                 )
         elif event.kind is EventKind.RISE:
             return _OrbitOutcome(
-                (*peaks, norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM), reached_instability_norm=True
+                (*peaks, norm + _ASSUMED_PEAK_ABOVE_INSTABILITY_NORM), reached_instability_norm=True
             )
         elif event.kind is EventKind.SETTLED and steady_state.is_stable:
             return _OrbitOutcome(

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
+from rsfstudy.critical_steps.slow_manifold_accuracy import is_slow_manifold_inaccurate
 from rsfstudy.motion import (
     Event,
     EventKind,
@@ -71,7 +71,7 @@ def compute_peak_log_rate_excess_over_norm(scene: Scene, integrator: Integrator)
     """
     norm, heavy, highest = (
         scene.log_instability_rate,
-        inertia_matters_below_norm(scene, integrator),
+        is_slow_manifold_inaccurate(scene, integrator),
         -math.inf,
     )
     try:
@@ -84,7 +84,7 @@ def compute_peak_log_rate_excess_over_norm(scene: Scene, integrator: Integrator)
             if event.kind in (EventKind.START, EventKind.MAXIMUM):
                 highest = max(highest, event.point.log_slip_rate)
             over = highest >= norm and (event.kind is EventKind.MAXIMUM or not heavy)
-            if over or _no_later_peak_reaches_norm(scene, event):
+            if over or _no_later_peak_reaches_instability_norm(scene, event):
                 break
     except MotionStopped as halt:
         if halt.status is not Status.SLIP_STOPPED:
@@ -112,19 +112,20 @@ def _build_event_specs_for_held_load_point(
     return specs
 
 
-def _no_later_peak_reaches_norm(scene: Scene, event: Event) -> bool:
+def _no_later_peak_reaches_instability_norm(scene: Scene, event: Event) -> bool:
     """Return True if no later peak of ln V can reach the instability norm."""
     slows = event.kind is EventKind.START and event.point.log_slip_rate_derivative <= 0.0
     if scene.state_count == 1:
         return slows or event.kind is EventKind.MAXIMUM
     if event.regime == Scene.RUPTURE_REGIME or not (slows or event.kind is EventKind.FALL):
         return False
-    return scene.mu_star + event.point.spring_stress <= 0.0 or _slip_rate_stays_below_norm(
-        scene, event.point
+    return (
+        scene.mu_star + event.point.spring_stress <= 0.0
+        or _slip_rate_stays_below_instability_norm(scene, event.point)
     )
 
 
-def _slip_rate_stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
+def _slip_rate_stays_below_instability_norm(scene: Scene, motion_point: MotionPoint) -> bool:
     """Return True if ln V provably stays below the instability norm.
 
     The slip rate must be decreasing at the tested point of the motion. A state that strengthens
@@ -136,17 +137,19 @@ def _slip_rate_stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     increased by this bound, the states weaken friction more slowly than the spring stress
     decreases.
     """
-    _value, slope, shift, shift_slope = scene.friction_relation(point.psis)(point.frictional_stress)
+    _value, slope, shift, shift_slope = scene.friction_relation(motion_point.psis)(
+        motion_point.frictional_stress
+    )
     states, evolve = range(scene.parts.law.state_count), scene.state_evolution_function()
-    strengthening = evolve(point.log_slip_rate, point.psis, shift)
+    strengthening = evolve(motion_point.log_slip_rate, motion_point.psis, shift)
     if min(strengthening[i] for i in states) < 0.0:
         return False
-    raised, least_shift = _bound_log_rate_rise_by_pore_pressure(scene, point)
-    if point.log_slip_rate + raised >= scene.log_instability_rate:
+    raised, least_shift = _compute_max_rate_rise_by_pore_pressure(scene, motion_point)
+    if motion_point.log_slip_rate + raised >= scene.log_instability_rate:
         return False
     fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_OVER_SPRING_UNLOADING)
     for distance in _LOG_RATE_DECREASES_TESTED_FOR_WEAKENING:
-        x = point.log_slip_rate - distance
+        x = motion_point.log_slip_rate - distance
         rest = scene.compute_steady_states(x, shift)
         later = scene.compute_steady_states(
             x - fallen / scene.a, shift - scene.stiffness * shift_slope
@@ -157,7 +160,9 @@ def _slip_rate_stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     return True
 
 
-def _bound_log_rate_rise_by_pore_pressure(scene: Scene, point: MotionPoint) -> tuple[float, float]:
+def _compute_max_rate_rise_by_pore_pressure(
+    scene: Scene, motion_point: MotionPoint
+) -> tuple[float, float]:
     """Compute an upper bound on the increase in ln V due to pore pressure and heat.
 
     The function returns the upper bound, and the smallest decrease in the state due to stress and
@@ -165,40 +170,42 @@ def _bound_log_rate_rise_by_pore_pressure(scene: Scene, point: MotionPoint) -> t
     tests trial increases in ln V. A trial increase is an upper bound if the highest pore pressure
     and temperature at the increased ln V reduce strength by less than a times the trial increase.
     """
-    value, _slope, shift, _ = scene.friction_relation(point.psis)(point.frictional_stress)
+    value, _slope, shift, _ = scene.friction_relation(motion_point.psis)(
+        motion_point.frictional_stress
+    )
     if not scene.parts.fluid.unknowns and not scene.parts.temperature.unknowns:
         return 0.0, shift
     for bound in _TRIAL_LOG_RATE_INCREASES_BY_PRESSURE:
         hottest, coldest = _find_extreme_pressure_and_heat_states(
-            scene, point, point.log_slip_rate + bound
+            scene, motion_point, motion_point.log_slip_rate + bound
         )
         if math.isinf(max(map(abs, (*hottest, *coldest)))):
             break
-        weaker = scene.friction_relation(hottest)(point.frictional_stress)[0]
+        weaker = scene.friction_relation(hottest)(motion_point.frictional_stress)[0]
         if weaker - value < bound * scene.a:
-            shift = scene.friction_relation(coldest)(point.frictional_stress)[2]
+            shift = scene.friction_relation(coldest)(motion_point.frictional_stress)[2]
             return bound, shift
     return math.inf, shift
 
 
 def _find_extreme_pressure_and_heat_states(
-    scene: Scene, point: MotionPoint, log_slip_rate: float
+    scene: Scene, motion_point: MotionPoint, log_slip_rate: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the states at the highest pore pressure and extreme temperatures.
 
     The bounds are valid as long as the slip rate does not exceed ``log_slip_rate``.
     """
     fluid, temperature = scene.parts.fluid, scene.parts.temperature
-    hottest, coldest, range_of_rise = list(point.psis), list(point.psis), 0.0
+    hottest, coldest, range_of_rise = list(motion_point.psis), list(motion_point.psis), 0.0
     if temperature.unknowns:
         place = scene.parts.law.state_count
-        stress = scene.mu_star + max(point.spring_stress, point.frictional_stress)
-        coldest[place], hottest[place] = temperature.rise_bounds(
-            scene, point.psis[place], stress * math.exp(log_slip_rate)
+        stress = scene.mu_star + max(motion_point.spring_stress, motion_point.frictional_stress)
+        coldest[place], hottest[place] = temperature.compute_temperature_rise_bounds(
+            scene, motion_point.psis[place], stress * math.exp(log_slip_rate)
         )
         range_of_rise = hottest[place] - coldest[place]
     if fluid.unknowns:
-        pressure = fluid.highest_pressure(log_slip_rate, point.psis[-len(fluid.unknowns) :])
+        pressure = fluid.highest_pressure(log_slip_rate, motion_point.psis[-len(fluid.unknowns) :])
         # The pressure is the sum of the response to drainage and of the response to heating.
         heated = fluid.pressurisation_factor
         hottest[-1] = coldest[-1] = pressure + (heated * range_of_rise if heated else 0.0)

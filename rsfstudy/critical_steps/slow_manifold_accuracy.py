@@ -6,7 +6,7 @@ from rsfstudy.motion import Integrator
 from rsfstudy.slider import Scene
 
 
-def inertia_matters_below_norm(scene: Scene, integrator: Integrator) -> bool:
+def is_slow_manifold_inaccurate(scene: Scene, integrator: Integrator) -> bool:
     """Return True if inertia makes the slow manifold inaccurate below the norm.
 
     Parameters

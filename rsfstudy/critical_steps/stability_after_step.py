@@ -13,7 +13,7 @@ from rsfstudy.status import Status
 #: Smallest significant difference from neutral stability. The limit applies to the relative
 #: difference between the stiffness and the critical stiffness, and to the decay rate per D_c of
 #: slip.
-_NEUTRAL_STABILITY_MARGIN = 1e-9
+_NEUTRAL_STABILITY_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,18 @@ class SteadySlidingWithStabilityMargin(SteadySliding):
         depend on the margin.
         """
         scene, law = self.scene, self.scene.parts.law
-        at_every_rate = may_have_closed_orbits(scene) and law.scale_free and not law.regularised
+        at_every_rate = (
+            has_closed_orbits_at_critical_stiffness(scene)
+            and law.lacks_characteristic_slip_rate
+            and not law.regularised
+        )
         if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
             margin = compute_stiffness_ratio_after_step(scene) - 1.0
         else:
             critical = scene.critical_stiffness_at(self.log_slip_rate)
             margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
         if (
-            margin < -_NEUTRAL_STABILITY_MARGIN
+            margin < -_NEUTRAL_STABILITY_TOLERANCE
             and scene.state_count > 1
             and _is_stable_to_small_perturbations(scene)
         ):
@@ -58,7 +62,7 @@ class SteadySlidingWithStabilityMargin(SteadySliding):
     @property
     def is_stable(self) -> bool:
         """True if small perturbations do not grow."""
-        return self.stability_margin >= -_NEUTRAL_STABILITY_MARGIN
+        return self.stability_margin >= -_NEUTRAL_STABILITY_TOLERANCE
 
 
 def has_frictional_damping_only(scene: Scene) -> bool:
@@ -84,7 +88,7 @@ def has_frictional_damping_only(scene: Scene) -> bool:
     return not scene.dynamics.radiated_stress_slope(0.0)
 
 
-def may_have_closed_orbits(scene: Scene) -> bool:
+def has_closed_orbits_at_critical_stiffness(scene: Scene) -> bool:
     """Return True if every orbit is closed at the critical stiffness.
 
     Parameters
@@ -145,7 +149,9 @@ def is_neutrally_stable(scene: Scene, tolerance: float) -> bool:
         closed. In both cases, the stability of steady sliding is known without integration.
     """
     off = abs(compute_stiffness_ratio_after_step(scene) - 1.0)
-    known = scene.log_load_velocity == -math.inf or (off == 0.0 and may_have_closed_orbits(scene))
+    known = scene.log_load_velocity == -math.inf or (
+        off == 0.0 and has_closed_orbits_at_critical_stiffness(scene)
+    )
     close = has_frictional_damping_only(scene) and off < tolerance and not known
     return close and abs(compute_stability_margin(scene)) < tolerance
 
@@ -163,7 +169,7 @@ def is_linearly_stable(scene: Scene) -> bool:
     bool
         True if small perturbations do not grow, or if the load point is held.
     """
-    return compute_stability_margin(scene) >= -_NEUTRAL_STABILITY_MARGIN
+    return compute_stability_margin(scene) >= -_NEUTRAL_STABILITY_TOLERANCE
 
 
 def compute_stability_margin(scene: Scene) -> float:
@@ -193,11 +199,11 @@ def compute_stability_margin(scene: Scene) -> float:
     return (
         math.inf
         if scene.log_load_velocity == -math.inf
-        else compute_steady_sliding_with_margin(scene).stability_margin
+        else find_steady_sliding_and_stability_margin(scene).stability_margin
     )
 
 
-def compute_steady_sliding_with_margin(scene: Scene) -> SteadySlidingWithStabilityMargin:
+def find_steady_sliding_and_stability_margin(scene: Scene) -> SteadySlidingWithStabilityMargin:
     """Compute steady sliding at the load point velocity of the scene.
 
     Parameters
@@ -232,5 +238,5 @@ def _is_stable_to_small_perturbations(scene: Scene) -> bool:
     critical stiffness.
     """
     return bool(
-        scene.linear_growth_rates(scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_MARGIN
+        scene.linear_growth_rates(scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_TOLERANCE
     )

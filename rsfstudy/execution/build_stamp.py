@@ -12,7 +12,7 @@ from pathlib import Path
 from setuptools.command.build_py import build_py
 
 
-class BuildWithCommit(build_py):  # type: ignore[misc]  # Setuptools has no type hints.
+class BuildPyWithGitCommit(build_py):  # type: ignore[misc]  # Setuptools has no type hints.
     """Setuptools build command that writes the commit to a file in the package.
 
     The command writes the file ``commit.txt``. If git cannot determine the commit, the file is not

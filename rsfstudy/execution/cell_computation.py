@@ -200,7 +200,7 @@ def _load_cell_settings(serialized_settings: bytes) -> SharedCellSettings:
             "the study file"
         ) from error
     used = (
-        *cell_settings.measure.code_classes,
+        *cell_settings.measure.result_determining_classes,
         *cell_settings.user_parts,
         *cell_settings.user_stepper_classes,
     )
@@ -274,7 +274,7 @@ def compute_packed_cell_batch(serialized_settings: bytes, packed_batch: bytes) -
     # A worker may be a thread of the process of the user.
     ours = cell_settings.origin_process_id == _UNIQUE_PROCESS_ID
     if not ours:
-        Engine.compilation_log.create_compilation_context = _cpu_time_limits.suspend_temporarily
+        Engine.compilation_log.compilation_context_factory = _cpu_time_limits.suspend_temporarily
     with (
         contextlib.nullcontext()
         if ours
@@ -362,13 +362,13 @@ class _CpuTimeLimits:
     @contextlib.contextmanager
     def enforce_in_this_thread(self, cpu_time_limit: float) -> Iterator[None]:
         """Limit the CPU time that the current thread can use for a cell."""
-        self._change_thread_count_and_timers(1, cpu_time_limit)
+        self._update_thread_count_and_cpu_timers(1, cpu_time_limit)
         try:
             yield
         finally:
-            self._change_thread_count_and_timers(-1, cpu_time_limit)
+            self._update_thread_count_and_cpu_timers(-1, cpu_time_limit)
 
-    def _change_thread_count_and_timers(
+    def _update_thread_count_and_cpu_timers(
         self, thread_count_change: int, cpu_time_limit: float
     ) -> None:
         """Change the number of computing threads, and restart the CPU timers."""

@@ -146,7 +146,9 @@ class CellPlan:
             from the measure of the study.
         """
         keys: list[bytes] = self.keys[cell_numbers].tolist()
-        return zip(keys, map(self.study.cell_changes, cell_numbers.tolist()), strict=True)
+        return zip(
+            keys, map(self.study.compute_cell_field_changes, cell_numbers.tolist()), strict=True
+        )
 
     def estimate_evaluations_and_time(self) -> tuple[int, float]:
         """Estimate the cost of the distinct cells of a study.

@@ -100,7 +100,7 @@ def _delay_interrupts() -> Iterator[None]:
             handlers[held[0]](held[0], None)
 
 
-def _wrap_unregister_for_unknown_names(unregister: Callable[..., None]) -> Any:
+def _wrap_resource_tracker_unregister(unregister: Callable[..., None]) -> Any:
     """Wrap ``resource_tracker.unregister`` to avoid tracebacks.
 
     If the tracker process is killed, Python starts a new tracker process. The existing semaphores
@@ -124,9 +124,7 @@ def _tolerate_lost_resource_tracker() -> None:
     garbage-collected.
     """
     if not hasattr(resource_tracker.unregister, "__wrapped__"):
-        resource_tracker.unregister = _wrap_unregister_for_unknown_names(
-            resource_tracker.unregister
-        )
+        resource_tracker.unregister = _wrap_resource_tracker_unregister(resource_tracker.unregister)
 
 
 @contextlib.contextmanager

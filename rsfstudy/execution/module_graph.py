@@ -101,10 +101,15 @@ class ModuleImportGraph:
         path = source_module.removeprefix(_PACKAGE_NAME).removeprefix(".")
         parts = path.split(".")
         for package in (".".join(parts[:length]) for length in range(1, len(parts) + 1)):
-            if package in self._modules and self._modules[package].module_by_lazy_export is None:
+            if (
+                package in self._modules
+                and self._modules[package].module_by_lazily_exported_name is None
+            ):
                 yield package
         modules = [f"{path}.{name}".removeprefix(".") for name in imported_names]
-        exports = self._modules[path].module_by_lazy_export if path in self._modules else None
+        exports = (
+            self._modules[path].module_by_lazily_exported_name if path in self._modules else None
+        )
         if exports is not None:
             exported = {f"{path}.{name}": module for name, module in exports.items()}
             modules = [exported.get(module, module) for module in modules]
@@ -143,7 +148,7 @@ class _ModuleSource:
         return _find_imports_from_package(self._code_without_docstrings)
 
     @cached_property
-    def module_by_lazy_export(self) -> Mapping[str, str] | None:
+    def module_by_lazily_exported_name(self) -> Mapping[str, str] | None:
         """Modules from which this module lazily exports names.
 
         Each key is an exported name, and each value is the name of a module. If the module does not

@@ -42,7 +42,7 @@ _PACKAGES_AFFECTING_CELL_RESULTS = (
 )
 
 
-def read_physics_source_files(package_directory: Path) -> dict[str, bytes]:
+def read_source_files_affecting_results(package_directory: Path) -> dict[str, bytes]:
     """Read the source files that may affect the results of cells.
 
     Parameters
@@ -65,7 +65,9 @@ def read_physics_source_files(package_directory: Path) -> dict[str, bytes]:
 
 #: Import graph of the source files at the time of the import. The source files are read only once,
 #: because later changes of the files do not affect the running code.
-_import_graph_at_import_time = ModuleImportGraph(read_physics_source_files(_PACKAGE_DIRECTORY))
+_import_graph_of_running_code = ModuleImportGraph(
+    read_source_files_affecting_results(_PACKAGE_DIRECTORY)
+)
 
 
 def collect_code_fingerprint(
@@ -86,7 +88,7 @@ def collect_code_fingerprint(
         Versions and digests by name.
     """
     return {
-        "physics": _import_graph_at_import_time.combined_digest,
+        "physics": _import_graph_of_running_code.combined_digest,
         "own_code": code_digest.digest_user_classes(*user_classes),
         # The Python version affects the byte code.
         "python": f"{sys.version_info.major}.{sys.version_info.minor}",
@@ -96,7 +98,9 @@ def collect_code_fingerprint(
     }
 
 
-def digest_reachable_modules(measure: Measure, example_scenes: Iterable[Scene]) -> dict[str, str]:
+def digest_modules_affecting_results(
+    measure: Measure, example_scenes: Iterable[Scene]
+) -> dict[str, str]:
     """Compute the code digests of the modules that a measure and scenes use.
 
     The digests include all modules that the measure and the parts of the scenes import, directly
@@ -115,20 +119,20 @@ def digest_reachable_modules(measure: Measure, example_scenes: Iterable[Scene]) 
     dict of str to str
         Digest of each module, by name.
     """
-    if not all(map(code_digest.is_defined_in_rsfstudy, measure.code_classes)):
+    if not all(map(code_digest.is_defined_in_rsfstudy, measure.result_determining_classes)):
         return {
-            **_import_graph_at_import_time.compute_digests(),
-            **code_digest.digest_measures_of_named_studies(measure.code_classes),
+            **_import_graph_of_running_code.compute_digests(),
+            **code_digest.digest_measures_of_named_studies(measure.result_determining_classes),
         }
     parts = {type(part) for scene in example_scenes for part in scene.parts}
-    roots = {kind.__module__ for kind in (Scene, *measure.code_classes, *parts)}
+    roots = {kind.__module__ for kind in (Scene, *measure.result_determining_classes, *parts)}
     if not all(map(code_digest.is_defined_in_rsfstudy, parts)):
         roots |= {
             f"rsfstudy.{name}"
-            for name in _import_graph_at_import_time.module_names
+            for name in _import_graph_of_running_code.module_names
             if name.startswith("slider.")
         }
-    return _import_graph_at_import_time.compute_digests(roots)
+    return _import_graph_of_running_code.compute_digests(roots)
 
 
 def collect_run_fingerprint(study: Study, example_scenes: Iterable[Scene]) -> dict[str, Any]:
@@ -158,8 +162,8 @@ def collect_run_fingerprint(study: Study, example_scenes: Iterable[Scene]) -> di
         "budget": accuracy.budget,
         "methods": [list(pair) for pair in accuracy.methods],
         "engine": accuracy.engine,
-        **collect_code_fingerprint(accuracy.engine, study.user_classes),
-        "physics": digest_reachable_modules(study.measure, example_scenes),
+        **collect_code_fingerprint(accuracy.engine, study.user_defined_classes),
+        "physics": digest_modules_affecting_results(study.measure, example_scenes),
     }
 
 
@@ -214,11 +218,11 @@ def build_provenance_attributes(command_line: str) -> dict[str, str]:
         Attributes ``source`` and ``history``.
     """
     when = datetime.now(UTC).isoformat(timespec="seconds")
-    return {"source": _build_source_attribute(), "history": f"{when} {command_line}"}
+    return {"source": _build_cf_source_attribute(), "history": f"{when} {command_line}"}
 
 
 @functools.cache
-def _build_source_attribute() -> str:
+def _build_cf_source_attribute() -> str:
     """Build the attribute ``source`` from the version and the commit of rsfstudy."""
     commit = read_git_commit_and_state(_PACKAGE_DIRECTORY.parent)
     return f"rsfstudy {version('rsfstudy')}, commit {commit}, numerical model of a spring-slider"

@@ -155,7 +155,7 @@ class StudyRun:
                 rule = f"does not fit this lattice: {type(error).__name__}: {error}"
                 raise InvalidValue("reduction", reduction.name, rule) from error
         for claim in () if self.study.overrides else self.study.claims:
-            claim.check_selection(lattice)
+            claim.check_applies_to_dataset(lattice)
 
     def build_output_path(self, file_suffix: str) -> Path:
         """Return the path of an output file of this run.

@@ -46,7 +46,7 @@ def prepare_study_run(
         user_parts=tuple(study.user_parts.values()),
         user_stepper_classes=Engine.find_user_stepper(study.accuracy.engine),
         code_fingerprint=provenance.collect_code_fingerprint(
-            study.accuracy.engine, study.user_classes
+            study.accuracy.engine, study.user_defined_classes
         ),
     )
     if worker_pool.make_cell_batch_mapper() is not compute_cell_batches_serially:

@@ -76,7 +76,7 @@ class _BackgroundJob(NamedTuple):
     bokeh_document: Any
 
 
-class BackgroundJobs:
+class BackgroundJobRunner:
     """Runner that executes the computations of a view in a thread, one at a time.
 
     If a computation is started while another computation is running, the new computation waits. The
@@ -123,7 +123,7 @@ class BackgroundJobs:
         on_result: Callable[[Any], None],
         on_error: Callable[[Exception], None],
         *,
-        label: str = "",
+        progress_label: str = "",
     ) -> None:
         """Run a computation in a thread, as soon as the browser has loaded the page.
 
@@ -139,7 +139,7 @@ class BackgroundJobs:
         label : str, optional
             Text next to the progress bar.
         """
-        job = _BackgroundJob(label, compute, on_result, on_error, pn.state.curdoc)
+        job = _BackgroundJob(progress_label, compute, on_result, on_error, pn.state.curdoc)
         pn.state.onload(partial(self._start_or_queue, job))
 
     def _start_or_queue(self, job: _BackgroundJob) -> None:

@@ -18,7 +18,7 @@ import panel as pn
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.explorer.background_jobs import BackgroundJobs
+from rsfstudy.explorer.background_jobs import BackgroundJobRunner
 from rsfstudy.explorer.error_messages import escape_markdown as escape_markdown
 from rsfstudy.explorer.error_messages import format_error_as_markdown
 from rsfstudy.plots import Figure, render_figure, style_context
@@ -65,7 +65,7 @@ class ExplorerView(ABC):
     def __init__(self, source: Any) -> None:
         """Create the parts of the page that all views share."""
         self.source = source
-        self.jobs = BackgroundJobs(self.show_warnings)
+        self.jobs = BackgroundJobRunner(self.show_warnings)
         self._alert = pn.pane.Alert("", alert_type="danger", visible=False)
         self._warnings = pn.pane.Alert("", alert_type="warning", visible=False)
         self._codes = {
@@ -124,7 +124,7 @@ class ExplorerView(ABC):
         """
 
     @abstractmethod
-    def write_python_code(self) -> str:
+    def format_equivalent_python_code(self) -> str:
         """Return Python code that reproduces the numbers of the view.
 
         Returns
@@ -134,7 +134,7 @@ class ExplorerView(ABC):
         """
 
     @abstractmethod
-    def write_command_line(self) -> str:
+    def format_equivalent_command_line(self) -> str:
         """Return a command line that reproduces the numbers of the view.
 
         Returns
@@ -240,10 +240,14 @@ class ExplorerView(ABC):
         """Settings of the widgets as compact JSON."""
         return json.dumps(self.get_widget_state(), separators=(",", ":"))
 
-    def update_code_and_url(self) -> None:
+    def update_displayed_code_and_url(self) -> None:
         """Update the code and the address of the page after the view has changed."""
         with self.show_raised_errors():
-            texts = self.write_python_code(), self.write_command_line(), self.widget_state_json
+            texts = (
+                self.format_equivalent_python_code(),
+                self.format_equivalent_command_line(),
+                self.widget_state_json,
+            )
             for box, text in zip(self._codes.values(), texts, strict=True):
                 box.value = text
         if pn.state.location is not None:
@@ -321,7 +325,7 @@ class ExplorerView(ABC):
             tabs,
             sizing_mode="stretch_width",
         )
-        pn.state.onload(self.update_code_and_url)
+        pn.state.onload(self.update_displayed_code_and_url)
         if pn.state.curdoc is not None and pn.state.curdoc.session_context is not None:
             pn.config.exception_handler = self.show_error  # of this browser tab only
             pn.state.curdoc.on_session_destroyed(lambda _context: self.jobs.cancel_all())

@@ -57,7 +57,7 @@ class RecomputedCell:
     outcome: Outcome
     motion: xr.Dataset
     motion_explanation: str
-    motion_code: str
+    motion_python_code: str
 
 
 def find_cell_coordinates(results: xr.Dataset, cell_number: int) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def recompute_cell_and_motion(
     motion, note, code = _extract_recorded_motion(study.measure, scene, outcome)
     if motion is None:
         measure = study.measure.with_(**study.cell(cell_number).measure_field_changes)
-        loading, note = _choose_loading_of_motion(measure, scene, outcome)
+        loading, note = _choose_loading_of_recomputed_motion(measure, scene, outcome)
         moving = scene.with_(**{name: value for name, (value, _text) in loading.items()})
         options: dict[str, Any] = {"rtol": study.accuracy.rtol, "engine": study.accuracy.engine}
         motion = simulate(moving, **options)
@@ -141,7 +141,7 @@ def _extract_recorded_motion(
     return xr.Dataset(columns, attrs=attributes), note, code
 
 
-def _choose_loading_of_motion(
+def _choose_loading_of_recomputed_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[dict[str, tuple[float, str]], str]:
     """Return the loading fields of a motion, their Python code, and an explanation."""

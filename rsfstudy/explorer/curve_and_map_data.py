@@ -22,7 +22,7 @@ from rsfstudy.status import Status
 #: Maximum number of panels, of curves in a panel, and of points of a curve.
 MAX_PANELS, MAX_CURVES, MAX_POINTS = 12, 40, 4000
 #: Number of blocks along each axis in which the statuses of many cells are shown.
-_STATUS_BLOCKS_PER_AXIS = 50
+_MAX_STATUS_MARK_BLOCKS_PER_AXIS = 50
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class CurveData:
     """
 
     label: str
-    point_index: int
+    colour_point_index: int
     x: np.ndarray
     y: np.ndarray
     y_error: np.ndarray
@@ -92,7 +92,7 @@ def find_error_variable_name(dataset: xr.Dataset, variable_name: str) -> str:
     )
 
 
-def list_shown_variable_names(dataset: xr.Dataset, selection: PlotSelection) -> list[str]:
+def list_plotted_variable_names(dataset: xr.Dataset, selection: PlotSelection) -> list[str]:
     """Return the names of the variables displayed by a selection.
 
     The list contains the plotted variable, its error estimate, the variable on the x axis, the
@@ -304,7 +304,7 @@ def sample_map_at_pixels(
     return map_data.values[np.ix_(*places)]
 
 
-class StatusMarks(NamedTuple):
+class CellStatusMarks(NamedTuple):
     """Cells whose status is not "ok".
 
     Parameters
@@ -321,7 +321,9 @@ class StatusMarks(NamedTuple):
     cell_numbers: np.ndarray
 
 
-def find_cells_to_mark(status_codes: np.ndarray, cell_numbers: np.ndarray) -> StatusMarks:
+def find_cells_to_mark_with_status(
+    status_codes: np.ndarray, cell_numbers: np.ndarray
+) -> CellStatusMarks:
     """Find the cells whose status is not "ok".
 
     If there are more than 2,500 such cells, the array is divided into 50 by 50 blocks, and one cell
@@ -340,17 +342,18 @@ def find_cells_to_mark(status_codes: np.ndarray, cell_numbers: np.ndarray) -> St
     """
     rows, columns = np.nonzero(status_codes != int(Status.OK))
     codes = status_codes[rows, columns]
-    if rows.size > _STATUS_BLOCKS_PER_AXIS**2:
+    if rows.size > _MAX_STATUS_MARK_BLOCKS_PER_AXIS**2:
         blocks = [
-            at * _STATUS_BLOCKS_PER_AXIS // size
+            at * _MAX_STATUS_MARK_BLOCKS_PER_AXIS // size
             for at, size in zip((rows, columns), status_codes.shape, strict=True)
         ]
         keys = np.ravel_multi_index(
-            (*blocks, codes), (_STATUS_BLOCKS_PER_AXIS, _STATUS_BLOCKS_PER_AXIS, len(Status))
+            (*blocks, codes),
+            (_MAX_STATUS_MARK_BLOCKS_PER_AXIS, _MAX_STATUS_MARK_BLOCKS_PER_AXIS, len(Status)),
         )
         kept = np.unique(keys, return_index=True)[1]
         rows, columns, codes = rows[kept], columns[kept], codes[kept]
-    return StatusMarks(rows, columns, codes, cell_numbers[rows, columns])
+    return CellStatusMarks(rows, columns, codes, cell_numbers[rows, columns])
 
 
 def format_status_name(status_code: int) -> str:
@@ -366,11 +369,13 @@ def convert_mathtext_to_unicode(mathtext: str) -> str:
     )
     for mark, digits in ((r"\^", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"), ("_", "₀₁₂₃₄₅₆₇₈₉₋")):
         small = str.maketrans("0123456789-", digits)
-        text = re.sub(mark + r"\{?(-?\d+)\}?", partial(_translate_matched_digits, small), text)
+        text = re.sub(
+            mark + r"\{?(-?\d+)\}?", partial(_convert_to_super_or_subscripts, small), text
+        )
     return re.sub(r"[{}]", "", text).replace("\\ ", " ")
 
 
-def _translate_matched_digits(digit_table: dict[int, int], match: re.Match[str]) -> str:
+def _convert_to_super_or_subscripts(digit_table: dict[int, int], match: re.Match[str]) -> str:
     """Return the digits of a match as superscripts or subscripts."""
     return match[1].translate(digit_table)
 

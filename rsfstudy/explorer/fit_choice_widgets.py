@@ -10,7 +10,7 @@ from rsfstudy.explorer.fit_choices import FitChoices
 from rsfstudy.fitting import LoadingStep
 
 #: Laws that the record view offers. The other laws need parameters that a fit does not determine.
-_OFFERED_LAWS = (
+_SELECTABLE_FRICTION_LAWS = (
     "slip",
     "slowness",
     "perrin_rice_zheng",
@@ -55,7 +55,7 @@ def create_fit_choice_widgets() -> dict[str, Any]:
         "begin": kinds.FloatInput(label="Begin (s)", value=None, **half),
         "end": kinds.FloatInput(label="End (s)", value=None, **half),
         "laws": kinds.MultiChoice(
-            label="Laws", options=[*_OFFERED_LAWS], value=[*default.laws], **wide
+            label="Laws", options=[*_SELECTABLE_FRICTION_LAWS], value=[*default.laws], **wide
         ),
         "stiffness": _create_text_input("Stiffness", "0.04 MPa/um, 2e-3 1/um or from record"),
         "trend_degree": kinds.Select(

@@ -150,7 +150,7 @@ class FitChoices:
         limits = {"begin": self.begin, "end": self.end}
         return {name: f"{at:.12g} s" for name, at in limits.items() if at is not None}
 
-    def cut_window_from(self, record: Record) -> Record:
+    def extract_fit_window(self, record: Record) -> Record:
         """Return the portion of a record that lies in the window.
 
         Parameters
@@ -172,7 +172,9 @@ class FitChoices:
         limits = self.build_window_limit_arguments()
         return read_record(record, **limits) if limits else record
 
-    def find_step_number(self, steps: Sequence[LoadingStep], excluded_time: float) -> int | None:
+    def find_number_of_excluded_step(
+        self, steps: Sequence[LoadingStep], excluded_time: float
+    ) -> int | None:
         """Return the number of the step at a time that the user has excluded.
 
         Parameters
@@ -214,7 +216,11 @@ class FitChoices:
             Numbers of the excluded steps, starting from 1.
         """
         return sorted(
-            {n for t in self.excluded if (n := self.find_step_number(steps, t)) is not None}
+            {
+                n
+                for t in self.excluded
+                if (n := self.find_number_of_excluded_step(steps, t)) is not None
+            }
         )
 
     def build_fit_arguments(self, steps: Sequence[LoadingStep]) -> dict[str, Any]:
@@ -295,7 +301,7 @@ def parse_column_headings(heading_assignments: str) -> dict[str, str]:
     return found
 
 
-def format_fit_command(path: str, arguments: Mapping[str, Any]) -> str:
+def format_fit_command(record_path: str, fit_arguments: Mapping[str, Any]) -> str:
     """Format the command line of a fit.
 
     Parameters
@@ -310,8 +316,8 @@ def format_fit_command(path: str, arguments: Mapping[str, Any]) -> str:
     str
         Command ``rsfstudy fit`` with quoted options.
     """
-    words = ["rsfstudy", "fit", path]
-    for name, value in arguments.items():
+    words = ["rsfstudy", "fit", record_path]
+    for name, value in fit_arguments.items():
         option = _COMMAND_OPTION_BY_KEYWORD.get(name, f"--{name.replace('_', '-')}")
         if isinstance(value, bool):
             words += [option] * value

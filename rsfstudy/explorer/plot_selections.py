@@ -22,7 +22,7 @@ from rsfstudy.vocabulary import find_coverage_content_type
 #: Kinds of plots.
 LINES, MAP = "lines", "map"
 #: Maximum number of curves that a new selection shows.
-_MAX_CURVES_OF_NEW_SELECTION = 12
+_MAX_CURVES_OF_DEFAULT_SELECTION = 12
 #: Minimum number of points of both axes for which a new selection shows a map.
 _MIN_AXIS_POINTS_FOR_DEFAULT_MAP = 6
 #: Variables of each cell that are offered although they are not results.
@@ -65,7 +65,7 @@ def list_plottable_variables(dataset: xr.Dataset) -> list[str]:
     """
     main = StoredDataset(dataset).primary_output_name
     if main is not None and main not in dataset:
-        main = DatasetUnits.convert_to_dimensional_name(main)
+        main = DatasetUnits.convert_to_dimensional_variable_name(main)
     names = [
         str(name)
         for name, values in dataset.data_vars.items()
@@ -117,7 +117,7 @@ def list_map_dimensions(dataset: xr.Dataset, variable_name: str) -> list[str]:
     return [d for d in dims if dataset.sizes[d] > 1 and dataset[d].dtype.kind in "iuf"]
 
 
-def complete_selection(
+def complete_plot_selection(
     dataset: xr.Dataset,
     variable: str | None = None,
     kind: str | None = None,
@@ -165,7 +165,7 @@ def complete_selection(
     across = plane if kind == MAP else list_x_axis_choices(dataset, variable)
     known = [str(name) for name in dataset.variables]
     if _check_choice_exists("x", x, known) not in across:
-        x = _choose_default_x(dataset, variable, plane if kind == MAP else plane or across)
+        x = _choose_default_x_name(dataset, variable, plane if kind == MAP else plane or across)
     along = find_dimension_along_x(dataset, variable, str(x))
     others = [d for d in map(str, dataset[variable].dims) if d != along]
     candidates = [d for d in others if d in plane or kind == LINES]
@@ -194,7 +194,7 @@ def _check_choice_exists(choice_name: str, value: Any, choices: Sequence[str]) -
     return value
 
 
-def _choose_default_x(dataset: xr.Dataset, variable_name: str, choices: Sequence[str]) -> str:
+def _choose_default_x_name(dataset: xr.Dataset, variable_name: str, choices: Sequence[str]) -> str:
     """Return the last dimension inside the cells, or else the longest dimension."""
     if inner := [d for d in _list_non_lattice_dimensions(dataset, variable_name) if d in choices]:
         return inner[-1]
@@ -207,5 +207,5 @@ def _choose_default_second_dimension(
     """Return the largest dimension for which all curves can be distinguished."""
     if plot_kind == MAP:
         return max(candidates, key=lambda name: dataset.sizes[name])
-    few = [d for d in candidates if 1 < dataset.sizes[d] <= _MAX_CURVES_OF_NEW_SELECTION]
+    few = [d for d in candidates if 1 < dataset.sizes[d] <= _MAX_CURVES_OF_DEFAULT_SELECTION]
     return max(few, key=lambda name: dataset.sizes[name]) if few else ""

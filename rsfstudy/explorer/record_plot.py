@@ -27,7 +27,7 @@ from rsfstudy.reporting import split_into_single_fits
 #: Width of a figure in pixels before the browser reports the actual width.
 _ASSUMED_FIGURE_WIDTH_PIXELS = 900
 #: Largest distance between a click and a step, as a fraction of the visible range.
-_MAX_CLICK_DISTANCE_FRACTION = 0.02
+_MAX_CLICK_DISTANCE_OVER_X_RANGE = 0.02
 #: Margin on both sides of the record, as a fraction of the visible range.
 _X_MARGIN_FRACTION = 0.02
 #: Columns of the record in the second to the fourth figure, and heights of all figures in pixels.
@@ -128,7 +128,7 @@ class RecordPlot:
         self.figures["normal_stress"].visible = "normal_stress" in record.columns
         other = "displacement" if x_column_name == "time" else "time"
         self.figures["displacement"].yaxis.axis_label = _AXIS_LABEL_AND_FACTOR_BY_COLUMN[other][0]
-        self._label_lowest_axis()
+        self._label_x_axis_of_lowest_figure()
         self._thin_visible_rows()
 
     def shade_rows_outside_window(self, begin: float | None, end: float | None) -> None:
@@ -184,7 +184,7 @@ class RecordPlot:
         self._fitted = [] if fit_dataset is None else [*_iterate_fit_curves_and_styles(fit_dataset)]
         self.figures["fit"].visible = bool(self._fitted)
         self.figures["friction"].legend.visible = bool(self._fitted)
-        self._label_lowest_axis()
+        self._label_x_axis_of_lowest_figure()
         self._thin_fit_curves_and_residuals()
 
     def _create_figure(self, figure_name: str) -> Any:
@@ -216,7 +216,7 @@ class RecordPlot:
         made.on_event(SelectionGeometry, self._handle_window_drag)
         return made
 
-    def _label_lowest_axis(self) -> None:
+    def _label_x_axis_of_lowest_figure(self) -> None:
         """Label the horizontal axis of the lowest visible figure only."""
         visible = [each for each in self.figures.values() if each.visible]
         for each in visible:
@@ -338,7 +338,7 @@ class RecordPlot:
             return
         apart = np.abs(np.array(self._steps.data["x"], dtype=float) - event.x)
         near = np.flatnonzero(
-            apart <= _MAX_CLICK_DISTANCE_FRACTION * (self._limits[1] - self._limits[0])
+            apart <= _MAX_CLICK_DISTANCE_OVER_X_RANGE * (self._limits[1] - self._limits[0])
         )
         if event.model is self.figures["steps"]:
             apart = np.abs(np.array(self._steps.data["y"]) - event.y)

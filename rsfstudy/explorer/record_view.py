@@ -27,7 +27,7 @@ from rsfstudy.reporting import (
     SummaryTableOrSentence,
     TextTable,
     build_summary_tables_and_sentences,
-    summarise_fits_as_fields,
+    summarise_fits_as_json_fields,
 )
 from rsfstudy.rig import read_record
 
@@ -196,7 +196,7 @@ class RecordView(ExplorerView):
         if self._record is not None:
             self.hide_error()
             with self.show_raised_errors():
-                self._window = self.fit_choices.cut_window_from(self._record)
+                self._window = self.fit_choices.extract_fit_window(self._record)
         self._plot.shade_rows_outside_window(self.fit_choices.begin, self.fit_choices.end)
         self._show_steps_to_fit()
 
@@ -235,7 +235,11 @@ class RecordView(ExplorerView):
         """Store the times of the steps that the user excluded in the window."""
         assert self._window is not None
         steps, choices = self._window.loading_steps, self.fit_choices
-        kept = [time for time in self._excluded if choices.find_step_number(steps, time) is None]
+        kept = [
+            time
+            for time in self._excluded
+            if choices.find_number_of_excluded_step(steps, time) is None
+        ]
         excluded = [
             float(f"{s.start:.9g}") for n, s in enumerate(steps, 1) if n not in self._steps.value
         ]
@@ -267,7 +271,7 @@ class RecordView(ExplorerView):
                 if self.fit_choices == choices:
                     self._show_fit(dataset)
 
-            self.jobs.start(compute, deliver, self.show_error, label="Fitting")
+            self.jobs.start(compute, deliver, self.show_error, progress_label="Fitting")
 
     def _show_fit(self, fit_dataset: xr.Dataset | None) -> None:
         """Show the fitted curves, the residuals and the tables."""
@@ -275,10 +279,10 @@ class RecordView(ExplorerView):
         self._plot.show_fit(fit_dataset)
         pieces = [] if fit_dataset is None else build_summary_tables_and_sentences(fit_dataset)
         self._summary[:] = [_create_summary_pane(piece) for piece in pieces]
-        values = [] if fit_dataset is None else summarise_fits_as_fields(fit_dataset)
+        values = [] if fit_dataset is None else summarise_fits_as_json_fields(fit_dataset)
         names = ("record", "step", "law", "status", "message")
         self._statuses.object = pd.DataFrame([{n: v[n] for n in names} for v in values])
-        self.update_code_and_url()
+        self.update_displayed_code_and_url()
 
     def _require_finished_fit(self) -> xr.Dataset:
         """Return the fit, or raise ``DataError`` if the record is not fitted."""
@@ -288,7 +292,7 @@ class RecordView(ExplorerView):
 
     # ---- code and downloads ---------------------------------------------------------------------
 
-    def write_python_code(self) -> str:
+    def format_equivalent_python_code(self) -> str:
         """Return Python code that reads and fits the record, and prints the fit table."""
         path, lines = self._record_file_path, ["import rsfstudy", ""]
         source = json.dumps(path) if path else "record"
@@ -309,7 +313,7 @@ class RecordView(ExplorerView):
         )
         return "\n".join([*lines, "print(fit.rsf.fit_table().T)"])
 
-    def write_command_line(self) -> str:
+    def format_equivalent_command_line(self) -> str:
         """Return the command ``rsfstudy fit`` with the options of the choices."""
         if not self._record_file_path:
             return "# The command line needs a record in a file."

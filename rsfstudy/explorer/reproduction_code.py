@@ -9,14 +9,19 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy.explorer.cell_recomputation import RecomputedCell
-from rsfstudy.explorer.curve_and_map_data import find_error_variable_name, list_shown_variable_names
+from rsfstudy.explorer.curve_and_map_data import (
+    find_error_variable_name,
+    list_plotted_variable_names,
+)
 from rsfstudy.explorer.plot_selections import MAP, PlotSelection
 from rsfstudy.plots import Figure, draw_figure
 from rsfstudy.study import Figure as DeclaredFigure
 from rsfstudy.study import Panel
 
 #: Line of the code of results that were not read from a file.
-_CODE_LINE_FOR_RESULTS_IN_MEMORY = "# results is the dataset that you passed to rsfstudy.explore."
+_CODE_COMMENT_FOR_RESULTS_IN_MEMORY = (
+    "# results is the dataset that you passed to rsfstudy.explore."
+)
 
 
 def draw_figure_of_selection(dataset: xr.Dataset, selection: PlotSelection) -> Figure:
@@ -51,7 +56,7 @@ def _build_panel_arguments(dataset: xr.Dataset, selection: PlotSelection) -> dic
     return options | ({"error_bars": error} if error else {}) | {"log": None}
 
 
-def write_selection_as_python_code(
+def format_selection_as_python_code(
     dataset: xr.Dataset,
     selection: PlotSelection,
     results_path: str,
@@ -82,13 +87,13 @@ def write_selection_as_python_code(
     lines += (
         [f"results = rsfstudy.open({results_path!r})"]
         if results_path
-        else [_CODE_LINE_FOR_RESULTS_IN_MEMORY]
+        else [_CODE_COMMENT_FOR_RESULTS_IN_MEMORY]
     )
     shown = "results"
     if "sigma_star" in dataset.variables:
         shown = "shown"
         lines.append("shown = results.rsf.in_units()  # in MPa, um and s")
-    points, names = dict(selection.points), list_shown_variable_names(dataset, selection)
+    points, names = dict(selection.points), list_plotted_variable_names(dataset, selection)
     lines.append(f"part = {shown}[{names!r}]{f'.isel({points!r})' if points else ''}")
     lines += ["print(part.to_dataframe())", ""]
     if selection.kind == MAP:
@@ -104,11 +109,11 @@ def write_selection_as_python_code(
     lines.append('figure.savefig("figure.pdf")')
     if recomputed_cell is not None:
         lines += ["", f"scene, outcome = rsfstudy.recompute_cell(results, {cell_coordinates!r})"]
-        lines += ["print(outcome.status.label, outcome.values)", recomputed_cell.motion_code]
+        lines += ["print(outcome.status.label, outcome.values)", recomputed_cell.motion_python_code]
     return "\n".join(lines) + "\n"
 
 
-def write_selection_as_shell_commands(
+def format_selection_as_shell_commands(
     selection: PlotSelection,
     results_path: str,
     widget_state_json: str,

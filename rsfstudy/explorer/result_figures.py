@@ -25,15 +25,15 @@ from bokeh.models import (
 from bokeh.plotting import figure
 
 from rsfstudy.explorer.curve_and_map_data import (
+    CellStatusMarks,
     CurveData,
     MapData,
-    StatusMarks,
     choose_evenly_spaced_indices,
     convert_mathtext_to_unicode,
     describe_selected_points,
     extract_curves_of_panel,
     extract_map_of_panel,
-    find_cells_to_mark,
+    find_cells_to_mark_with_status,
     format_status_name,
     sample_map_at_pixels,
 )
@@ -69,7 +69,7 @@ _MAX_POINTS_WITH_MARKERS, _MAX_SELECTABLE_POINTS = 60, 6000
 #: a larger lattice.
 _MAX_CELLS_OF_IMAGE, _PIXELS = 2**21, (1000, 1400)
 #: Number of rows of status symbols at the bottom of a figure.
-_STATUS_SYMBOL_ROW_COUNT = 8
+_MAX_STATUS_SYMBOL_ROWS = 8
 _BOKEH_DASH_BY_MATPLOTLIB_LINESTYLE = {"-": [], "--": [6, 3], ":": [2, 3], "-.": [6, 3, 2, 3]}
 _BOKEH_MARKER_BY_MATPLOTLIB_MARKER = {
     "o": "circle", "s": "square", "^": "triangle", "D": "diamond", "v": "inverted_triangle",
@@ -110,7 +110,7 @@ class ResultPlot(ABC):
         codes = np.unique(dataset["status"].values).tolist()
         self._symbols = dict(zip(codes, _BOKEH_MARKERS_OF_STATUSES * 4, strict=False))
         self.marks = ColumnDataSource(
-            _build_status_symbol_columns({}, StatusMarks(*[np.array([], int)] * 4), [], [])
+            _build_status_symbol_columns({}, CellStatusMarks(*[np.array([], int)] * 4), [], [])
         )
         self.figure: Any = figure(
             height=height,
@@ -176,13 +176,13 @@ class ResultPlot(ABC):
         self.figure.add_tools(HoverTool(renderers=[drawn], tooltips=[("status", "@status")]))
         return drawn
 
-    def set_status_symbols(self, status_marks: StatusMarks, x: Any, y: Any) -> None:
+    def set_status_symbols(self, status_marks: CellStatusMarks, x: Any, y: Any) -> None:
         """Replace the symbols of the statuses."""
         self.marks.data = _build_status_symbol_columns(self._symbols, status_marks, x, y)
 
 
 def _build_status_symbol_columns(
-    marker_by_status: dict[int, str], status_marks: StatusMarks, x: Any, y: Any
+    marker_by_status: dict[int, str], status_marks: CellStatusMarks, x: Any, y: Any
 ) -> dict[str, Any]:
     """Return the data source columns of the status symbols."""
     failed = status_marks.status_codes >= int(Status.WORK_BUDGET_SPENT)
@@ -258,13 +258,16 @@ class CurvesPlot(ResultPlot):
             **{name: [s[name] for s in styles] for name in ("color", "dash", "alpha")},
         }
         self.points.data = _build_point_columns(curves, styles)
-        pairs = [find_cells_to_mark(c.status_codes[None], c.cell_numbers[None]) for c in curves]
+        pairs = [
+            find_cells_to_mark_with_status(c.status_codes[None], c.cell_numbers[None])
+            for c in curves
+        ]
         at = [c.x[m.column_indices] for c, m in zip(curves, pairs, strict=True)]
         rows = [
-            np.full(m.row_indices.size, 0.03 + 0.05 * (i % _STATUS_SYMBOL_ROW_COUNT))
+            np.full(m.row_indices.size, 0.03 + 0.05 * (i % _MAX_STATUS_SYMBOL_ROWS))
             for i, m in enumerate(pairs)
         ]
-        marks = StatusMarks(*(np.concatenate(parts) for parts in zip(*pairs, strict=True)))
+        marks = CellStatusMarks(*(np.concatenate(parts) for parts in zip(*pairs, strict=True)))
         self.set_status_symbols(marks, np.concatenate(at), np.concatenate(rows))
 
 
@@ -273,11 +276,11 @@ def _choose_curve_styles(
 ) -> list[dict[str, Any]]:
     """Return the colour, dashes, opacity, marker and marker size of each curve."""
     with style_context():
-        cycled = [cycle_style(c.point_index) for c in curves]
+        cycled = [cycle_style(c.colour_point_index) for c in curves]
     colours, dashes = [s["color"] for s in cycled], [s["linestyle"] for s in cycled]
     if mapper := build_colour_mapper_of_dimension(dataset, panel.second):
         points = dataset[panel.second].values.astype(float)
-        colours = [find_colour_of_value(mapper, points[c.point_index]) for c in curves]
+        colours = [find_colour_of_value(mapper, points[c.colour_point_index]) for c in curves]
         dashes = ["-"] * len(curves)
     is_recorded = panel.x in dataset.data_vars
     is_number = has_numeric_dtype(dataset[panel.x]) and not find_used_flag_names(
@@ -291,7 +294,7 @@ def _choose_curve_styles(
             if isinstance(dash, str)
             else list(dash[1]),
             "alpha": float(has_line),
-            "marker": _BOKEH_MARKER_BY_MATPLOTLIB_MARKER[cycle_marker(curve.point_index)],
+            "marker": _BOKEH_MARKER_BY_MATPLOTLIB_MARKER[cycle_marker(curve.colour_point_index)],
             "size": 6 if curve.x.size <= _MAX_POINTS_WITH_MARKERS or not has_line else 2,
         }
         for curve, colour, dash in zip(curves, colours, dashes, strict=True)
@@ -387,7 +390,7 @@ class MapPlot(ResultPlot):
             "image": [values.astype(np.float32)], "x": [x[0]], "y": [y[0]],
             "dw": [x[1] - x[0]], "dh": [y[1] - y[0]],
         }  # fmt: skip
-        marks = find_cells_to_mark(found.status_codes, found.cell_numbers)
+        marks = find_cells_to_mark_with_status(found.status_codes, found.cell_numbers)
         self.set_status_symbols(marks, found.x[marks.column_indices], found.y[marks.row_indices])
         self.chosen.data = {"x": [], "y": []}
 

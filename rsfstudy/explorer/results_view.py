@@ -26,13 +26,13 @@ from rsfstudy.explorer.curve_and_map_data import (
     describe_selected_points,
     format_status_name,
     iterate_panel_selections,
-    list_shown_variable_names,
+    list_plotted_variable_names,
 )
 from rsfstudy.explorer.plot_selections import (
     LINES,
     MAP,
     PlotSelection,
-    complete_selection,
+    complete_plot_selection,
     find_dimension_along_x,
     list_map_dimensions,
     list_plottable_variables,
@@ -40,11 +40,11 @@ from rsfstudy.explorer.plot_selections import (
 )
 from rsfstudy.explorer.reproduction_code import (
     draw_figure_of_selection,
-    write_selection_as_python_code,
-    write_selection_as_shell_commands,
+    format_selection_as_python_code,
+    format_selection_as_shell_commands,
 )
 from rsfstudy.explorer.result_figures import CurvesPlot, MapPlot, ResultPlot
-from rsfstudy.formatting import format_nonempty_fields
+from rsfstudy.formatting import format_fields_except_none
 from rsfstudy.plots import Figure, draw_figure, render_figure
 from rsfstudy.reporting import build_failed_cells_table, count_cells_by_status
 from rsfstudy.rig import DatasetUnits
@@ -59,7 +59,7 @@ _SIDE_BY_SIDE_GRID_STYLE = {
     "grid-template-columns": "repeat(auto-fit, minmax(380px, 1fr))",
 }
 #: Number of points of a dimension above which the cell is chosen by its index.
-_MAX_POINTS_OF_SELECT_WIDGET = 100
+_MAX_OPTIONS_OF_SELECT_WIDGET = 100
 _STRETCH_WIDTH_OPTIONS: dict[str, Any] = {"sizing_mode": "stretch_width"}
 _SELECTION_FIELD_NAMES = ("variable", "kind", "x", "second", "facet")
 _LABEL_OF_NO_DIMENSION = "(none)"
@@ -89,7 +89,7 @@ class ResultsView(ExplorerView):
         self.file = str(source.encoding.get("source", ""))
         self.title = str(source.attrs.get("title", "Results of a study"))
         self.download_file_stem = str(source.attrs.get("id", "results"))
-        self.selection = complete_selection(self.shown)
+        self.selection = complete_plot_selection(self.shown)
         self.cell: RecomputedCell | None = None
         self._cell_number = -1
         self._plots: list[ResultPlot] = []
@@ -209,7 +209,7 @@ class ResultsView(ExplorerView):
             wishes |= {"x": None, "second": None}
         with self.show_raised_errors():
             self._show_selection(
-                complete_selection(self.shown, **wishes, points=self.selection.points)
+                complete_plot_selection(self.shown, **wishes, points=self.selection.points)
             )
 
     def _handle_slider_change(self, dimension: str, event: Any) -> None:
@@ -224,7 +224,7 @@ class ResultsView(ExplorerView):
     def _build_selection_with_points(self, point_indices: Mapping[str, int]) -> PlotSelection:
         """Return the selection with other points."""
         wishes = {name: getattr(self.selection, name) for name in _SELECTION_FIELD_NAMES}
-        return complete_selection(self.shown, **wishes, points=point_indices)
+        return complete_plot_selection(self.shown, **wishes, points=point_indices)
 
     def _show_selection(self, selection: PlotSelection) -> None:
         """Show another selection.
@@ -241,7 +241,7 @@ class ResultsView(ExplorerView):
                 plot.update_data(self.shown, panel)
         else:
             self._build_plots()
-        self.update_code_and_url()
+        self.update_displayed_code_and_url()
 
     # ---- plots ----------------------------------------------------------------------------------
 
@@ -266,7 +266,7 @@ class ResultsView(ExplorerView):
                 lambda _report: render_figure(draw_figure(self.results), "png"),
                 self._show_figure_of_study,
                 self.show_error,
-                label="Drawing the figure of the study",
+                progress_label="Drawing the figure of the study",
             )
 
     def _show_figure_of_study(self, png_image: bytes) -> None:
@@ -297,21 +297,21 @@ class ResultsView(ExplorerView):
         text = format_status_name(int(stored["status"]))
         message = str(stored["message"].item())
         self._cell_area[:] = [
-            _create_text_pane(format_nonempty_fields(place), "bold"),
+            _create_text_pane(format_fields_except_none(place), "bold"),
             _create_text_pane(f"{text}{': ' * bool(message)}{message}"),
         ]
         self.jobs.start(
             partial(recompute_cell_and_motion, self.results, cell_number),
             self._show_recomputed_cell,
             self.show_error,
-            label="Computing the cell",
+            progress_label="Computing the cell",
         )
-        self.update_code_and_url()
+        self.update_displayed_code_and_url()
 
     def _show_recomputed_cell(self, recomputed_cell: RecomputedCell) -> None:
         """Show the scene, the outcome and the motion of a cell."""
         self.cell = recomputed_cell
-        fields = _create_text_pane(format_nonempty_fields(recomputed_cell.scene.as_dict()))
+        fields = _create_text_pane(format_fields_except_none(recomputed_cell.scene.as_dict()))
         table = pn.pane.DataFrame(
             tabulate_recomputed_outcome(recomputed_cell, self.results),
             index=False,
@@ -332,7 +332,7 @@ class ResultsView(ExplorerView):
             pn.Column(*figures, styles=_SIDE_BY_SIDE_GRID_STYLE, **_STRETCH_WIDTH_OPTIONS),
             _create_text_pane(recomputed_cell.motion_explanation),
         ]
-        self.update_code_and_url()
+        self.update_displayed_code_and_url()
 
     # ---- state, code and downloads --------------------------------------------------------------
 
@@ -349,7 +349,7 @@ class ResultsView(ExplorerView):
             if name not in known:
                 raise InvalidValue("state", name, "is not a setting of this view", choices=known)
         wishes = {name: widget_state[name] for name in widget_state if name != "cell"}
-        self._show_selection(complete_selection(self.shown, **wishes))
+        self._show_selection(complete_plot_selection(self.shown, **wishes))
         if "cell" in widget_state:
             number, size = widget_state["cell"], self.results["status"].size
             if not isinstance(number, int) or not 0 <= number < size:
@@ -357,18 +357,18 @@ class ResultsView(ExplorerView):
                 raise InvalidValue("cell", number, rule)
             self._start_cell_recomputation(number)
 
-    def write_python_code(self) -> str:
+    def format_equivalent_python_code(self) -> str:
         """Return code that prints the numbers of the plot.
 
         See ``ExplorerView.write_python_code``.
         """
-        return write_selection_as_python_code(
+        return format_selection_as_python_code(
             self.shown, self.selection, self.file, self.cell, self._find_chosen_cell_coordinates()
         )
 
-    def write_command_line(self) -> str:
+    def format_equivalent_command_line(self) -> str:
         """Return commands that export the results. See ``ExplorerView.write_command_line``."""
-        return write_selection_as_shell_commands(
+        return format_selection_as_shell_commands(
             self.selection, self.file, self.widget_state_json, self._find_chosen_cell_coordinates()
         )
 
@@ -399,7 +399,7 @@ class ResultsView(ExplorerView):
 
         See ``ExplorerView.build_dataset_for_download``.
         """
-        names = list_shown_variable_names(self.shown, self.selection)
+        names = list_plotted_variable_names(self.shown, self.selection)
         return self.shown[names].isel(dict(self.selection.points))
 
 
@@ -422,7 +422,7 @@ def _create_dimension_slider(dataset: xr.Dataset, dimension: str) -> Any:
 def _create_cell_choice_widget(results: xr.Dataset, dimension: str) -> Any:
     """Return a widget that selects a point of a dimension by its value or its index."""
     points = results[dimension].values
-    if points.size > _MAX_POINTS_OF_SELECT_WIDGET:
+    if points.size > _MAX_OPTIONS_OF_SELECT_WIDGET:
         return pn.widgets.IntInput(
             label=f"Index of {dimension}",
             start=0,

@@ -52,7 +52,7 @@ _TYPICAL_VALUE_BY_RIG_QUANTITY = README_RIG_QUANTITIES | {
     "shear_zone_width": "0.1 mm", "reference_temperature": "295 K",
     "pressurisation_factor": "0.3 MPa/K",
 }  # fmt: skip
-_PROTOCOL_TEMPLATE_BY_HAS_RIG = {
+_EXAMPLE_PROTOCOL_CSV_BY_HAS_RIG = {
     True: "velocity (um/s), duration (s)\n10, 60\n0, 600\n10, 60\n",
     False: "velocity (V_*), duration (D_c/V_*)\n10, 6\n0, 60\n10, 6\n",
 }
@@ -106,7 +106,8 @@ class SceneControls:
         )
         cards += [
             self._create_card(
-                f"{slot.name}: {self.find_part_name_of_slot(slot)}", self._create_slot_widgets(slot)
+                f"{slot.name}: {self.find_name_of_selected_part(slot)}",
+                self._create_part_slot_widgets(slot),
             )
             for slot in SceneFields.PART_SLOTS
         ]
@@ -116,7 +117,7 @@ class SceneControls:
 
     # ---- parts ----------------------------------------------------------------------------------
 
-    def find_part_name_of_slot(self, slot: Any) -> str:
+    def find_name_of_selected_part(self, part_slot: Any) -> str:
         """Return the name of the part that the settings select for a slot.
 
         Parameters
@@ -130,28 +131,32 @@ class SceneControls:
             Name of the part.
         """
         fields = self.settings.scene
-        if slot.name == "loading" and self.settings.protocol:
+        if part_slot.name == "loading" and self.settings.protocol:
             return PROTOCOL_LOADING_NAME
-        for selecting, part in slot.part_class_by_selecting_field.items():
+        for selecting, part in part_slot.part_class_by_selecting_field.items():
             if fields.get(selecting) or (selecting == "inertia" and "period" in self.settings.rig):
                 return str(part.name)
             if selecting == "radiation_damping" and "density" in self.settings.rig:
                 return str(part.name)
-        return str(fields.get(slot.name, slot.default_part_name))
+        return str(fields.get(part_slot.name, part_slot.default_part_name))
 
-    def _select_part(self, slot: Any, part_name: str) -> None:
+    def _select_part(self, part_slot: Any, part_name: str) -> None:
         """Select a part, and drop the fields of the previous part."""
-        classes = {**slot.built_in_parts, **slot.user_parts}
+        classes = {**part_slot.built_in_parts, **part_slot.user_parts}
         classes.pop(PROTOCOL_LOADING_NAME, None)
-        old = classes.get(self.find_part_name_of_slot(slot))
+        old = classes.get(self.find_name_of_selected_part(part_slot))
         new = classes.get(part_name)
         kept = set(SceneFields.list_names_of_part(new)) if new else set()
         dropped = set(SceneFields.list_names_of_part(old)) - kept if old else set()
         dropped |= {find_dimensional_field_name(field) for field in dropped}
         fields = {n: v for n, v in self.settings.scene.items() if n not in dropped}
-        if not slot.part_class_by_selecting_field:
-            fields[slot.name] = part_name
-        elif new is not None and new.selected_by and (self._rig is None or slot.name == "loading"):
+        if not part_slot.part_class_by_selecting_field:
+            fields[part_slot.name] = part_name
+        elif (
+            new is not None
+            and new.selected_by
+            and (self._rig is None or part_slot.name == "loading")
+        ):
             fields[new.selected_by] = self._find_typical_value(new.selected_by)
         rig = dict(self.settings.rig)
         for quantity in _EXTRA_RIG_QUANTITIES_BY_PART.get(old.name, ()) if old else ():
@@ -159,9 +164,9 @@ class SceneControls:
         for quantity in _EXTRA_RIG_QUANTITIES_BY_PART.get(part_name, ()) if rig else ():
             rig[quantity] = _TYPICAL_VALUE_BY_RIG_QUANTITY[quantity]
         protocol = self.settings.protocol
-        if slot.name == "loading":
+        if part_slot.name == "loading":
             protocol = (
-                _PROTOCOL_TEMPLATE_BY_HAS_RIG[bool(rig)]
+                _EXAMPLE_PROTOCOL_CSV_BY_HAS_RIG[bool(rig)]
                 if part_name == PROTOCOL_LOADING_NAME
                 else ""
             )
@@ -200,21 +205,21 @@ class SceneControls:
             margin=(2, 0),
         )  # fmt: skip
 
-    def _create_slot_widgets(self, slot: Any) -> list[Any]:
+    def _create_part_slot_widgets(self, part_slot: Any) -> list[Any]:
         """Return the selector of a slot and the widgets of the selected part."""
-        name = self.find_part_name_of_slot(slot)
-        options = [*slot.built_in_parts, *slot.user_parts]
+        name = self.find_name_of_selected_part(part_slot)
+        options = [*part_slot.built_in_parts, *part_slot.user_parts]
         options += (
             [PROTOCOL_LOADING_NAME]
-            if slot.name == "loading" and PROTOCOL_LOADING_NAME not in options
+            if part_slot.name == "loading" and PROTOCOL_LOADING_NAME not in options
             else []
         )
-        selector = pn.widgets.Select(label=slot.name, options=options, value=name, width=265)
-        selector.param.watch(lambda event: self._select_part(slot, event.new), "value")
+        selector = pn.widgets.Select(label=part_slot.name, options=options, value=name, width=265)
+        selector.param.watch(lambda event: self._select_part(part_slot, event.new), "value")
         widgets = [selector]
         if name == PROTOCOL_LOADING_NAME:
             return [*widgets, self._create_protocol_text_box()]
-        part = {**slot.built_in_parts, **slot.user_parts}[name]
+        part = {**part_slot.built_in_parts, **part_slot.user_parts}[name]
         return widgets + self._create_field_widgets(part, SceneFields.list_names_of_part(part))
 
     def _create_field_widgets(self, part: Any, field_names: tuple[str, ...]) -> list[Any]:

@@ -194,7 +194,7 @@ class SceneSettings:
 
     # ---- reproduction ---------------------------------------------------------------------------
 
-    def write_python_code(self) -> str:
+    def format_equivalent_python_code(self) -> str:
         """Return Python code that computes and saves the motion."""
         lines, values = ["import rsfstudy", ""], format_values_as_python_code(self.scene)
         for name, part in _find_user_defined_parts().items():
@@ -234,7 +234,7 @@ class SceneSettings:
         text = f"rig.dimensionless({json.dumps(self.duration)})" if self.rig else self.duration
         return f", duration={text}{engine}"
 
-    def write_command_line(self) -> str:
+    def format_equivalent_command_line(self) -> str:
         """Return the command line that computes and saves the motion."""
         options = [f"--{name.replace('_', '-')}={value}" for name, value in self.rig.items()]
         options += [f"--set={name}={value}" for name, value in self.scene.items()]

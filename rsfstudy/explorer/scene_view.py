@@ -60,9 +60,9 @@ class ComputedMotion(NamedTuple):
 
     rig: Rig | None
     scene: Scene
-    motion: xr.Dataset
-    displayed_motion: xr.Dataset
-    tables_and_sentences: list[Any]
+    dimensionless_motion: xr.Dataset
+    motion_in_display_units: xr.Dataset
+    summary_tables_and_sentences: list[Any]
 
     @classmethod
     def compute_from_settings(cls, settings: SceneSettings) -> ComputedMotion:
@@ -90,8 +90,11 @@ class ComputedMotion(NamedTuple):
     @property
     def stability_summary(self) -> str:
         """Sentences about the stability of steady sliding and the end of the motion."""
-        sentences = [text for text in self.tables_and_sentences if isinstance(text, str)]
-        status, message = self.motion.attrs["status"], self.motion.attrs["message"]
+        sentences = [text for text in self.summary_tables_and_sentences if isinstance(text, str)]
+        status, message = (
+            self.dimensionless_motion.attrs["status"],
+            self.dimensionless_motion.attrs["message"],
+        )
         ending = "" if status == "ok" else f" Motion: {status}. {message}"
         ratio = f"k/k_cr = {self.scene.stiffness_ratio:.6g}"
         return f"{ratio}: {sentences[0]}.{ending}"
@@ -99,7 +102,9 @@ class ComputedMotion(NamedTuple):
     @property
     def peak_values_text(self) -> str:
         """Peak friction and peak slip rate of the motion."""
-        values = next(each for each in self.tables_and_sentences if isinstance(each, Mapping))
+        values = next(
+            each for each in self.summary_tables_and_sentences if isinstance(each, Mapping)
+        )
         return "; ".join(f"{name}: {text}" for name, text in values.items())
 
     def build_plot_columns(self) -> dict[str, np.ndarray]:
@@ -113,14 +118,18 @@ class ComputedMotion(NamedTuple):
         stress_name = next(
             name
             for name in ("normal_stress_ratio", "effective_normal_stress")
-            if name in self.motion
+            if name in self.dimensionless_motion
         )
-        fault = self.motion["frictional_stress"] / self.motion[stress_name]
+        fault = (
+            self.dimensionless_motion["frictional_stress"] / self.dimensionless_motion[stress_name]
+        )
         return {
-            "time": self.displayed_motion["time"].values,
-            "displacement": self.displayed_motion["load_point_displacement"].values,
-            "friction": self.displayed_motion["friction_coefficient"].values,
-            "rate": self._convert_log10_slip_rates(self.motion["log10_slip_rate"].values),
+            "time": self.motion_in_display_units["time"].values,
+            "displacement": self.motion_in_display_units["load_point_displacement"].values,
+            "friction": self.motion_in_display_units["friction_coefficient"].values,
+            "rate": self._convert_slip_rates_to_display_units(
+                self.dimensionless_motion["log10_slip_rate"].values
+            ),
             "fault": fault.values,
         }
 
@@ -132,7 +141,7 @@ class ComputedMotion(NamedTuple):
         dict of str to ndarray
             Slip rate and friction.
         """
-        logs = self.motion["log10_slip_rate"].values
+        logs = self.dimensionless_motion["log10_slip_rate"].values
         logs = logs[np.isfinite(logs)]
         low, high = (logs.min(), logs.max()) if logs.size else (0.0, 0.0)
         rates = np.linspace(low - _STEADY_EXTENSION, high + _STEADY_EXTENSION, _STEADY_POINTS)
@@ -142,17 +151,17 @@ class ComputedMotion(NamedTuple):
         ]
         friction = np.array([math.nan if each is None else each for each in excess], float)
         return {
-            "rate": self._convert_log10_slip_rates(rates),
+            "rate": self._convert_slip_rates_to_display_units(rates),
             "friction": self.scene.mu_star + friction,
         }
 
-    def _convert_log10_slip_rates(self, log10_slip_rates: np.ndarray) -> np.ndarray:
+    def _convert_slip_rates_to_display_units(self, log10_slip_rates: np.ndarray) -> np.ndarray:
         """Return slip rates in the units of the page."""
         scale = self.rig.reference_velocity * 1e6 if self.rig else 1.0
         return np.asarray(scale * 10.0 ** np.minimum(log10_slip_rates, 300.0))
 
 
-class SceneView(ExplorerView):
+class SimulationView(ExplorerView):
     """View of a scene with its stability, its motion and its phase plane.
 
     Parameters
@@ -221,26 +230,26 @@ class SceneView(ExplorerView):
         """Show other settings."""
         self._show_settings_and_compute(SceneSettings.from_widget_state(widget_state))
 
-    def write_python_code(self) -> str:
+    def format_equivalent_python_code(self) -> str:
         """Return Python code that computes the motion."""
-        return self._controls.settings.write_python_code()
+        return self._controls.settings.format_equivalent_python_code()
 
-    def write_command_line(self) -> str:
+    def format_equivalent_command_line(self) -> str:
         """Return a command line that computes the motion."""
-        return self._controls.settings.write_command_line()
+        return self._controls.settings.format_equivalent_command_line()
 
     def draw_figure_for_download(self) -> Figure:
         """Return the figure of the motion."""
         result = self._require_computed_motion()
-        return plot_motion(result.motion, result.rig)
+        return plot_motion(result.dimensionless_motion, result.rig)
 
     def build_table_for_download(self) -> pd.DataFrame:
         """Return the motion with one row per time."""
-        return self._require_computed_motion().displayed_motion.to_dataframe().reset_index()
+        return self._require_computed_motion().motion_in_display_units.to_dataframe().reset_index()
 
     def build_dataset_for_download(self) -> xr.Dataset:
         """Return the motion in the units of the page."""
-        return self._require_computed_motion().displayed_motion
+        return self._require_computed_motion().motion_in_display_units
 
     # ---- changes --------------------------------------------------------------------------------
 
@@ -281,7 +290,10 @@ class SceneView(ExplorerView):
             return ComputedMotion.compute_from_settings(settings)
 
         self.jobs.start(
-            compute, self._show_computed_motion, self._show_computation_error, label="Computing"
+            compute,
+            self._show_computed_motion,
+            self._show_computation_error,
+            progress_label="Computing",
         )
 
     def _show_computation_error(self, error: Exception) -> None:
@@ -290,7 +302,7 @@ class SceneView(ExplorerView):
         self._verdict.object = self._peaks.object = ""
         for source in (self._motion_source, self._start_source, self._steady_source):
             source.data = {name: [] for name in source.data}
-        self.update_code_and_url()
+        self.update_displayed_code_and_url()
         self.show_error(error)
 
     def _show_computed_motion(self, computed_motion: ComputedMotion) -> None:
@@ -305,9 +317,9 @@ class SceneView(ExplorerView):
         self._peaks.object = escape_markdown(computed_motion.peak_values_text)
         self._events.objects = [
             pn.pane.DataFrame(pd.DataFrame(each.rows), index=False)
-            for each in computed_motion.tables_and_sentences
+            for each in computed_motion.summary_tables_and_sentences
             if isinstance(each, TextTable)
-        ] or [pn.pane.Str(str(computed_motion.tables_and_sentences[-1]))]
+        ] or [pn.pane.Str(str(computed_motion.summary_tables_and_sentences[-1]))]
         time, length, rate = (
             ("s", "µm", "µm/s") if computed_motion.rig else ("D_c/V_*", "D_c", "V_*")
         )
@@ -316,7 +328,7 @@ class SceneView(ExplorerView):
         self._figures["displacement"].xaxis.axis_label = f"Load point displacement ({length})"
         self._figures["plane"].xaxis.axis_label = f"Slip rate ({rate})"
         self._figures["rate_time"].yaxis.axis_label = f"Slip rate ({rate})"
-        self.update_code_and_url()
+        self.update_displayed_code_and_url()
 
     # ---- plots ----------------------------------------------------------------------------------
 

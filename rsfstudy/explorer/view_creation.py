@@ -30,7 +30,7 @@ _MODULE_AND_CLASS_BY_VIEW_KIND = {
 _RESULTS_FILE_SUFFIXES = (".nc", ".nc4", ".zarr")
 
 
-def create_view(source: Any = None, state: str | None = None) -> ExplorerView:
+def create_view(source: Any = None, state_json: str | None = None) -> ExplorerView:
     """Create the view of a scene, a dataset or a file.
 
     Parameters
@@ -48,7 +48,7 @@ def create_view(source: Any = None, state: str | None = None) -> ExplorerView:
     kind, loaded = _find_view_kind_and_object(source)
     module, name = _MODULE_AND_CLASS_BY_VIEW_KIND[kind]
     view_class: type[ExplorerView] = getattr(importlib.import_module(module), name)
-    return view_class.create_with_widget_state(loaded, view_class.parse_widget_state(state))
+    return view_class.create_with_widget_state(loaded, view_class.parse_widget_state(state_json))
 
 
 def _find_view_kind_and_object(source: Any) -> tuple[str, Any]:

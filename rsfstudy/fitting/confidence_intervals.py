@@ -22,7 +22,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
-from rsfstudy.fitting.window_model import fit_coordinate_to_parameter
+from rsfstudy.fitting.window_model import convert_fit_coordinate_to_parameter
 
 #: Settings of confidence intervals. The first value is the confidence level. The profile likelihood
 #: is computed if the relative deviation of the log-likelihood from a quadratic function exceeds the
@@ -106,7 +106,8 @@ def compute_confidence_interval(
         fit_problem.upper_bounds[profile.parameter_index],
     )
     low, high = (
-        fit_coordinate_to_parameter(parameter_name, float(end)) for end in np.clip(ends, *bounds)
+        convert_fit_coordinate_to_parameter(parameter_name, float(end))
+        for end in np.clip(ends, *bounds)
     )
     return low, high
 
@@ -142,9 +143,7 @@ class LikelihoodProfile:
             solution,
             solution.free_parameters.index(parameter_name),
         )
-        self.best_coordinates = problem.parameter_values_to_fit_coordinates(
-            solution.parameter_values
-        )
+        self.best_coordinates = problem.compute_fit_coordinates(solution.parameter_values)
         variance = float(
             solution.fit_coordinate_covariance_from_noise[
                 self.parameter_index, self.parameter_index
@@ -232,7 +231,7 @@ class LikelihoodProfile:
         others = np.arange(len(x)) != self.parameter_index
         rest = FitProblem(
             self.problem.model,
-            self.problem.fit_coordinates_to_parameter_values(x),
+            self.problem.compute_parameter_values(x),
             [
                 name
                 for name in self.solution.free_parameters
@@ -257,7 +256,7 @@ class LikelihoodProfile:
         If the simulation of the motion fails, the residuals are NaN.
         """
         left = self.problem.compute_residuals(
-            self.problem.fit_coordinates_to_parameter_values(fit_coordinates), require_stable=True
+            self.problem.compute_parameter_values(fit_coordinates), require_stable=True
         )
         return (
             self.solution.noise_model.whiten_columns(left[:, None])[:, 0] / self.solution.noise_sd

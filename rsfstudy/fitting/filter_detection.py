@@ -73,9 +73,9 @@ def detect_unspecified_filter(
     least = fit_solution.friction_rounding_quantum / math.sqrt(12.0)
     # The delay caused by a filter is similar to an error of the step time.
     delays = (
-        fit_solution.loading_error_sensitivity[:, :0]
+        fit_solution.friction_change_by_loading_error[:, :0]
         if "step_time" in fit_solution.free_parameters
-        else fit_solution.loading_error_sensitivity
+        else fit_solution.friction_change_by_loading_error
     )
     columns = np.column_stack([fit_solution.jacobian, delays, fit_solution.model_friction])
     free = len(fit_solution.fit_coordinate_stderr)
@@ -156,7 +156,7 @@ def _apply_filter_to_columns(
     if filter_kind == "mean":
         return apply_running_mean(time, sample_columns, filter_size)
     one = Filter(filter_kind, filter_size)
-    at = one.sample_times(time)
+    at = one.compute_required_sample_times(time)
     return np.column_stack(
         [one.apply(time, np.interp(at, time, each)) for each in sample_columns.T]
     )

@@ -110,7 +110,7 @@ class Filter:
             raise InvalidValue("filter", text, rule, choices=FILTER_KINDS) from None
         return cls(kind, number)
 
-    def sample_times(self, time: np.ndarray) -> np.ndarray:
+    def compute_required_sample_times(self, time: np.ndarray) -> np.ndarray:
         """Return the times at which the filter uses values of the unfiltered friction.
 
         Parameters
@@ -127,7 +127,7 @@ class Filter:
             return self._build_low_pass_time_grid(time)
         return np.unique(time[:, None] + self._compute_running_mean_time_offsets(time))
 
-    def apply(self, time: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    def apply(self, time: np.ndarray, unfiltered_samples: np.ndarray) -> np.ndarray:
         """Apply the filter to unfiltered friction.
 
         Parameters
@@ -142,19 +142,19 @@ class Filter:
         ndarray, shape (rows,)
             Filtered friction of each row.
         """
-        at = self.sample_times(time)
+        at = self.compute_required_sample_times(time)
         if self.kind not in LOW_PASS_ORDERS:
             places = np.searchsorted(
                 at, time[:, None] + self._compute_running_mean_time_offsets(time)
             )
-            return np.asarray(samples[places].mean(axis=1))
+            return np.asarray(unfiltered_samples[places].mean(axis=1))
         rate = 1.0 / float(at[1] - at[0])
         sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=rate, output="sos")
         # Friction is assumed to be constant before the first row.
-        begin = sosfilt_zi(sections) * samples[0]
-        return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
+        begin = sosfilt_zi(sections) * unfiltered_samples[0]
+        return np.asarray(np.interp(time, at, sosfilt(sections, unfiltered_samples, zi=begin)[0]))
 
-    def complete_rows(self, time: np.ndarray) -> slice:
+    def find_fully_averaged_rows(self, time: np.ndarray) -> slice:
         """Return the rows whose averaging interval lies within the record.
 
         Parameters
@@ -175,7 +175,7 @@ class Filter:
         """
         if self.kind in LOW_PASS_ORDERS:
             return slice(0, len(time))
-        before, after = self._split_averaging_time_at_row()
+        before, after = self._compute_averaging_time_on_each_side()
         first = int(np.searchsorted(time, time[0] + before))
         last = int(np.searchsorted(time, time[-1] - after, side="right"))
         if first >= last:
@@ -186,7 +186,7 @@ class Filter:
             raise InvalidValue("filter", f"{self.kind} {self.size:g} s", rule)
         return slice(first, last)
 
-    def filter_rows(self, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    def filter_recorded_values(self, time: np.ndarray, recorded_values: np.ndarray) -> np.ndarray:
         """Apply the filter to recorded rows.
 
         Parameters
@@ -211,8 +211,8 @@ class Filter:
         if self.kind not in LOW_PASS_ORDERS:
             centre = 0.0 if self.kind == MEAN else -0.5 * self.size
             # The deviations from the mean have smaller rounding errors.
-            level = values.mean()
-            deviations = (values - level)[:, None]
+            level = recorded_values.mean()
+            deviations = (recorded_values - level)[:, None]
             return np.asarray(level + apply_running_mean(time, deviations, self.size, centre)[:, 0])
         interval = float(np.median(np.diff(time)))
         about = f"{self.kind} {self.size:g} Hz"
@@ -230,13 +230,13 @@ class Filter:
             )
             raise InvalidValue("filter", about, rule, remedy="Use a running mean: 'mean 1 s'.")
         at = np.arange(time[0], time[-1] + step, step)
-        samples = np.interp(at, time, values)
+        samples = np.interp(at, time, recorded_values)
         sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=1.0 / step, output="sos")
         # The values are assumed to be constant before the first row.
         begin = sosfilt_zi(sections) * samples[0]
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
-    def _split_averaging_time_at_row(self) -> tuple[float, float]:
+    def _compute_averaging_time_on_each_side(self) -> tuple[float, float]:
         """Return the durations in s of the averaging interval before and after a row."""
         return (0.5 * self.size, 0.5 * self.size) if self.kind == MEAN else (self.size, 0.0)
 

@@ -23,7 +23,7 @@ from rsfstudy.fitting.filters import Filter
 from rsfstudy.fitting.fit_outputs import build_fit_outputs
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 from rsfstudy.fitting.fit_validity_checks import (
-    MIN_NOISE_SD_ABOVE_NUMERICAL_ERRORS,
+    MIN_FRICTION_NOISE_SD,
     describe_asymmetric_confidence_intervals,
     describe_load_point_noise,
     describe_outliers,
@@ -51,7 +51,7 @@ from rsfstudy.fitting.noise import (
 )
 from rsfstudy.fitting.record import RECORD_COLUMNS, Record
 from rsfstudy.fitting.window_model import (
-    PARAMETERS_OF_SOME_LAWS_ONLY,
+    LAW_SPECIFIC_PARAMETERS,
     check_fields_positive,
     check_free_parameters,
     parameters_of_law,
@@ -76,7 +76,7 @@ _SCENE_FIELDS_SET_BY_FIT = (
 )
 #: The direct effect counts as being at its lower bound if the ratio of the direct effect to its
 #: lower bound is less than this value.
-_MAX_DIRECT_EFFECT_RATIO_TO_LOWER_BOUND = 1.001
+_MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND = 1.001
 
 
 @wrap_methods_in_error_boundary
@@ -259,7 +259,7 @@ class Fit(Measure):
     def primary_output(self) -> str:
         """Name of the first free parameter that occurs in all friction laws."""
         return next(
-            (n for n in self.parameters if n not in PARAMETERS_OF_SOME_LAWS_ONLY),
+            (n for n in self.parameters if n not in LAW_SPECIFIC_PARAMETERS),
             self.parameters[0],
         )
 
@@ -412,7 +412,7 @@ class Fit(Measure):
             )
         windows = self._fitted_windows
         search, found = self.solve(scene, integrator)
-        model, place = search.model, windows[0].window_properties
+        model, place = search.model, windows[0].window_summary_values
         part = model.window_models[0]
         apart = float(
             np.median(np.diff(part.load_point_displacement[part.time >= windows[0].step.start]))
@@ -447,7 +447,7 @@ class Fit(Measure):
             is_least = (
                 "a" in found.free_parameters
                 and found.parameter_values["a"]
-                < _MAX_DIRECT_EFFECT_RATIO_TO_LOWER_BOUND * search.compute_parameter_bounds("a")[0]
+                < _MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND * search.compute_parameter_bounds("a")[0]
             )
             text = describe_unidentified_parameters(
                 found, unidentified, apart, direct_effect_is_at_bound=is_least
@@ -490,9 +490,9 @@ class Fit(Measure):
         smooth = integrator.tightened_to(_MAX_RTOL_FOR_FINITE_DIFFERENCES)
         windows = self._fitted_windows
         per_um = self.machine_stiffness * self.slip_distance_guess
-        scenes = [w.with_machine_stiffness(scene, per_um) for w in windows]
+        scenes = [w.build_scene_with_machine_stiffness(scene, per_um) for w in windows]
         of_each = zip(windows, scenes, strict=True)
-        parts = [w.create_model(one, self.free, self.loading, smooth) for w, one in of_each]
+        parts = [w.create_window_model(one, self.free, self.loading, smooth) for w, one in of_each]
         parts = [replace(part, friction_filter=Filter.parse(self.filter)) for part in parts]
         if self.noise == WHITE_NOISE_NAME:  # The usual formula ignores the noise of the load point.
             parts = [replace(part, loadings_with_shifted_steps=()) for part in parts]
@@ -532,7 +532,7 @@ class Fit(Measure):
         # With recorded loading, any filter would reduce the effect of load point noise, so the test
         # for a filter would be misleading.
         is_recorded = self.loading == "recorded"
-        is_exact = solution.noise_sd < MIN_NOISE_SD_ABOVE_NUMERICAL_ERRORS
+        is_exact = solution.noise_sd < MIN_FRICTION_NOISE_SD
         if (
             self.filter
             or is_recorded
@@ -543,7 +543,7 @@ class Fit(Measure):
             return reasons
         return (
             *detect_unspecified_filter(
-                solution, problem.model.time_since_first_row_of_window, self.noise
+                solution, problem.model.time_since_start_of_each_window, self.noise
             ),
             *reasons,
         )

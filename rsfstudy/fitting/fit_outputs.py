@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from rsfstudy.fitting.joint_model import strip_window_number
 from rsfstudy.fitting.record import RECORD_COLUMNS
-from rsfstudy.fitting.window_model import PARAMETERS, PARAMETERS_OF_SOME_LAWS_ONLY
+from rsfstudy.fitting.window_model import LAW_SPECIFIC_PARAMETERS, PARAMETERS
 from rsfstudy.quantities import Output
 
 #: Outputs of every fit that have a single value.
@@ -107,7 +107,7 @@ def build_fit_outputs(
 def _iterate_outputs_of_parameter(parameter_name: str) -> Iterator[Output]:
     """Describe the outputs of a parameter and of its errors."""
     about = PARAMETERS[strip_window_number(parameter_name)]
-    optional = strip_window_number(parameter_name) in PARAMETERS_OF_SOME_LAWS_ONLY
+    optional = strip_window_number(parameter_name) in LAW_SPECIFIC_PARAMETERS
     yield Output(
         parameter_name, about.symbol, about.units, about.long_name, error=True, optional=optional
     )

@@ -42,8 +42,8 @@ from rsfstudy.fitting.window_model import (
     FiniteDifferenceScheme,
     ParameterValues,
     compute_derivative_by_fit_coordinate,
-    fit_coordinate_to_parameter,
-    parameter_to_fit_coordinate,
+    convert_fit_coordinate_to_parameter,
+    convert_parameter_to_fit_coordinate,
 )
 from rsfstudy.motion import MotionStopped
 from rsfstudy.status import Status
@@ -177,7 +177,7 @@ class FitProblem:
             return -late, late
         return _PARAMETER_BOUNDS.get(parameter_name, (-math.inf, math.inf))
 
-    def fit_coordinates_to_parameter_values(self, fit_coordinates: np.ndarray) -> dict[str, float]:
+    def compute_parameter_values(self, fit_coordinates: np.ndarray) -> dict[str, float]:
         """Convert coordinates to the values of all parameters.
 
         Parameters
@@ -192,10 +192,10 @@ class FitProblem:
         """
         found = zip(self.free_parameters, fit_coordinates.tolist(), strict=True)
         return self.initial_values | {
-            name: fit_coordinate_to_parameter(name, v) for name, v in found
+            name: convert_fit_coordinate_to_parameter(name, v) for name, v in found
         }
 
-    def parameter_values_to_fit_coordinates(self, parameter_values: ParameterValues) -> np.ndarray:
+    def compute_fit_coordinates(self, parameter_values: ParameterValues) -> np.ndarray:
         """Convert the values of parameters to coordinates.
 
         Parameters
@@ -210,7 +210,7 @@ class FitProblem:
         """
         return np.array(
             [
-                parameter_to_fit_coordinate(name, parameter_values[name])
+                convert_parameter_to_fit_coordinate(name, parameter_values[name])
                 for name in self.free_parameters
             ]
         )
@@ -248,7 +248,7 @@ class FitProblem:
         parameters. A derivative is set to 0 if a simulation for its finite difference fails.
         """
         found = self.model.compute_jacobian(
-            self.fit_coordinates_to_parameter_values(fit_coordinates),
+            self.compute_parameter_values(fit_coordinates),
             self.free_parameters,
             difference_scheme,
         )
@@ -270,7 +270,7 @@ class FitProblem:
         """
         x, noise = (
             self._find_initial_fit_coordinates(),
-            noises.build_white_noise_model(self.model.time_since_first_row_of_window),
+            noises.build_white_noise_model(self.model.time_since_start_of_each_window),
         )
         for number in range(
             1
@@ -280,7 +280,7 @@ class FitProblem:
         ):
             before = x
             x, jacobian = self.minimise_weighted_squares(x, noise)
-            left = self.compute_residuals(self.fit_coordinates_to_parameter_values(x))
+            left = self.compute_residuals(self.compute_parameter_values(x))
             if not number:
                 self.ordinary_least_squares_residuals = left
             if number and _has_converged(
@@ -293,12 +293,12 @@ class FitProblem:
             least = self.friction_rounding_quantum / math.sqrt(12.0)
             noise = noises.fit_noise_model(
                 self.noise_model_name,
-                self.model.time_since_first_row_of_window,
+                self.model.time_since_start_of_each_window,
                 left,
                 jacobian,
                 kept,
                 least,
-                self.model.averaging_time,
+                self.model.friction_averaging_time,
             )
         found = self._build_solution(x, noise)
         if not (self.has_converged or found.unidentified_parameters):
@@ -326,9 +326,9 @@ class FitProblem:
         best = (math.inf, self.initial_values)
         for scale in scales:
             values = self.initial_values | {n: self.initial_values[n] * scale for n in distances}
-            values = self.fit_coordinates_to_parameter_values(
+            values = self.compute_parameter_values(
                 np.clip(
-                    self.parameter_values_to_fit_coordinates(values),
+                    self.compute_fit_coordinates(values),
                     self.lower_bounds,
                     self.upper_bounds,
                 )
@@ -342,7 +342,7 @@ class FitProblem:
         if not math.isfinite(best[0]):
             text = "the motion for the first guess cannot be computed, or the stiffness is below "
             raise MotionStopped(Status.NOT_APPLICABLE, f"{text}the critical stiffness")
-        return self.parameter_values_to_fit_coordinates(best[1])
+        return self.compute_fit_coordinates(best[1])
 
     def minimise_weighted_squares(
         self,
@@ -374,9 +374,7 @@ class FitProblem:
         derivatives = {}
 
         def left(x: np.ndarray) -> np.ndarray:
-            found = self.compute_residuals(
-                self.fit_coordinates_to_parameter_values(x), require_stable=True
-            )
+            found = self.compute_residuals(self.compute_parameter_values(x), require_stable=True)
             return np.asarray(noise_model.whiten_columns(found[:, None])[:, 0] / scale)
 
         def slopes(x: np.ndarray) -> np.ndarray:
@@ -412,7 +410,7 @@ class FitProblem:
         change = math.inf
         for number in range(_NEWTON_STEP_COUNT_LIMITS[2]):
             jacobian = self._compute_jacobian(fit_coordinates, ACCURATE_DIFFERENCE_SCHEME)
-            left = self.compute_residuals(self.fit_coordinates_to_parameter_values(fit_coordinates))
+            left = self.compute_residuals(self.compute_parameter_values(fit_coordinates))
             whitened = noise_model.whiten_columns(np.column_stack([jacobian, left]))
             if not np.isfinite(whitened).all():
                 raise MotionStopped(
@@ -426,9 +424,7 @@ class FitProblem:
             moved = beyond - fit_coordinates
             before, change = change, float(np.linalg.norm(whitened[:, :-1] @ moved))
             if np.isfinite(
-                self.compute_residuals(
-                    self.fit_coordinates_to_parameter_values(beyond), require_stable=True
-                )
+                self.compute_residuals(self.compute_parameter_values(beyond), require_stable=True)
             ).all():
                 fit_coordinates = beyond
             if number + 1 >= _NEWTON_STEP_COUNT_LIMITS[0] and _has_converged(
@@ -442,7 +438,7 @@ class FitProblem:
                 and not change < _MAX_NEWTON_STEP_SHRINK_RATIO * before
             ):
                 break
-        values = self.fit_coordinates_to_parameter_values(fit_coordinates)
+        values = self.compute_parameter_values(fit_coordinates)
         curve = self.model.compute_model_friction(values)
         left = self.model.recorded_friction - curve - self.model.compute_friction_trend(values)
         innovations = noise_model.whiten_columns(left[:, None])[:, 0]
@@ -451,7 +447,7 @@ class FitProblem:
         size = math.sqrt(float(innovations @ innovations) / free_of)
         inverse = _compute_inverse_normal_matrix(whitened[:, :-1])
         by_noise = covariance = size**2 * inverse
-        moved_by = self.model.compute_loading_error_sensitivity(values)
+        moved_by = self.model.compute_friction_change_by_loading_error(values)
         if moved_by.size and np.isfinite(inverse).all():
             shifts = inverse @ whitened[:, :-1].T @ noise_model.whiten_columns(moved_by)
             covariance = by_noise + shifts @ shifts.T
@@ -494,7 +490,7 @@ class FitProblem:
             residuals=left,
             whitened_residuals=innovations / size,
             jacobian=jacobian,
-            loading_error_sensitivity=moved_by,
+            friction_change_by_loading_error=moved_by,
             aic=criterion,
             unidentified_parameters=self._find_unidentified_parameters(
                 fit_coordinates, values, covariance, steps
@@ -615,7 +611,7 @@ class FitProblem:
         place = self.free_parameters.index(parameter_name)
         ends = self.lower_bounds[place], self.upper_bounds[place]
         low, high = (
-            fit_coordinate_to_parameter(parameter_name, v) if math.isfinite(v) else math.nan
+            convert_fit_coordinate_to_parameter(parameter_name, v) if math.isfinite(v) else math.nan
             for v in ends
         )
         return low, high

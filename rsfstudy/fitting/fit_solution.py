@@ -79,7 +79,7 @@ class FitSolution:
     residuals: np.ndarray
     whitened_residuals: np.ndarray
     jacobian: np.ndarray
-    loading_error_sensitivity: np.ndarray
+    friction_change_by_loading_error: np.ndarray
     aic: float
     unidentified_parameters: tuple[str, ...]
     ols_residual_rms: float

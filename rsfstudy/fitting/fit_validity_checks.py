@@ -24,7 +24,7 @@ SLIP_DISTANCE_PARAMETER_NAMES = ("slip_distance", "slip_distance_2")
 #: Significance level of the test for autocorrelated whitened residuals.
 WHITENESS_TEST_SIGNIFICANCE_LEVEL = 0.01
 #: Standard deviation of friction below which the residuals are numerical errors rather than noise.
-MIN_NOISE_SD_ABOVE_NUMERICAL_ERRORS = 1e-7
+MIN_FRICTION_NOISE_SD = 1e-7
 #: Largest ratio of the root mean square residual of a fit to the root mean square residual of an
 #: ordinary least-squares fit.
 _MAX_RESIDUAL_RMS_OVER_OLS_RESIDUAL_RMS = 2.0
@@ -57,7 +57,7 @@ def find_reasons_for_invalid_stderrs(
     tuple of str
         Reasons why the standard errors are not valid. The tuple is empty if they are valid.
     """
-    if fit_solution.noise_sd < MIN_NOISE_SD_ABOVE_NUMERICAL_ERRORS:
+    if fit_solution.noise_sd < MIN_FRICTION_NOISE_SD:
         return ()
     return (
         *_yield_warning_if_misfit_is_large(fit_solution, recorded_friction),

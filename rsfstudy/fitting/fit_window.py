@@ -41,7 +41,7 @@ _WINDOW_START_BEFORE_STEP_FRACTION, _MIN_ROWS_PER_PARAMETER = 0.5, 3
 _MAX_LOADING_DELAY_OVER_TIME_BEFORE_STEP = 0.2
 #: A remark is added to the result if the ratio of the actual extent of a window to its requested
 #: extent is less than this value.
-_MIN_WINDOW_FRACTION_WITHOUT_REMARK = 0.98
+_MIN_WINDOW_OVER_REQUESTED_WINDOW = 0.98
 #: Allowed values of the option ``loading``.
 LOADING_KINDS = ("steps", "recorded")
 #: Settings for comparing the recorded normal stress with the normal stress of the model. The first
@@ -142,7 +142,7 @@ class FitWindow:
         return float(stress[min(first, len(time) - 1) : max(first + 1, last)].mean())
 
     @property
-    def window_properties(self) -> dict[str, float]:
+    def window_summary_values(self) -> dict[str, float]:
         """Velocities, window limits in um, normal stress and load point noise."""
         record, rows = self.record, self.record_row_indices
         moved, time = record.columns["displacement"][rows], record.time[rows]
@@ -155,7 +155,7 @@ class FitWindow:
             "normal_stress_before": self.mean_normal_stress_before_step,
         }
 
-    def with_machine_stiffness(self, scene: Scene, machine_stiffness: float) -> Scene:
+    def build_scene_with_machine_stiffness(self, scene: Scene, machine_stiffness: float) -> Scene:
         """Return a scene with the stiffness of a testing machine.
 
         The stiffness of the scene is the stiffness of the machine divided by the normal stress
@@ -239,7 +239,7 @@ class FitWindow:
                 f"the window begins {at - begins:.4g} um before the step instead of "
                 f"{at - nominal:.4g} um, because the earlier friction is not a straight line"
             )
-        elif at - begins < _MIN_WINDOW_FRACTION_WITHOUT_REMARK * self.displacement_before:
+        elif at - begins < _MIN_WINDOW_OVER_REQUESTED_WINDOW * self.displacement_before:
             found.append(
                 f"before= is reduced from {self.displacement_before:.4g} to {at - begins:.4g} um, "
                 "because the previous step or the beginning of the record is less than twice "
@@ -247,7 +247,7 @@ class FitWindow:
             )
         if (
             self.fraction_of_displacement_after == 1.0
-            and ends - at < _MIN_WINDOW_FRACTION_WITHOUT_REMARK * self.displacement_after
+            and ends - at < _MIN_WINDOW_OVER_REQUESTED_WINDOW * self.displacement_after
         ):
             cut = f"after= is reduced from {self.displacement_after:.4g} to {ends - at:.4g} um"
             found.append(f"{cut} because of the {later}")
@@ -271,7 +271,7 @@ class FitWindow:
             begins = max(begins, record.time[np.argmax(moved >= at - self.displacement_before)])
         return float(begins)
 
-    def create_model(
+    def create_window_model(
         self,
         scene: Scene,
         free_parameters: Collection[str],
@@ -361,7 +361,7 @@ class FitWindow:
         ]
 
     def _check_normal_stress_matches_loading(
-        self, rows: np.ndarray, loading_segments: np.ndarray
+        self, row_indices: np.ndarray, loading_segments: np.ndarray
     ) -> None:
         """Raise an error if recorded and modelled normal stress differ.
 
@@ -371,8 +371,8 @@ class FitWindow:
         record = self.record
         if "normal_stress" not in record.columns:
             return
-        time, before = record.time[rows], self.mean_normal_stress_before_step
-        stress = record.columns["normal_stress"][rows] / before
+        time, before = record.time[row_indices], self.mean_normal_stress_before_step
+        stress = record.columns["normal_stress"][row_indices] / before
         piece = np.maximum(np.searchsorted(loading_segments[:, 0], time, side="right") - 1, 0)
         modelled = loading_segments[piece, 2] + loading_segments[piece, 3] * (
             time - loading_segments[piece, 0]

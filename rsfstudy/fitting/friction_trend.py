@@ -14,7 +14,7 @@ from rsfstudy.fitting.velocity_steps import LoadingStep
 
 #: The window of steady sliding before a step begins at this fraction of the time between the
 #: previous step and the step.
-_STEADY_WINDOW_START_OVER_STEP_INTERVAL = 0.5
+_STEADY_START_FRACTION_OF_STEP_INTERVAL = 0.5
 #: Largest and smallest number of rows of a window.
 _MAX_ROWS, MIN_ROWS = 4000, 12
 
@@ -39,7 +39,7 @@ def select_steady_rows_before_step(
     ndarray of int
         Indices of the rows. The array is empty if there are too few rows.
     """
-    share = _STEADY_WINDOW_START_OVER_STEP_INTERVAL if start_time > time[0] else 0.0
+    share = _STEADY_START_FRACTION_OF_STEP_INTERVAL if start_time > time[0] else 0.0
     start_time += share * (end_time - start_time)
     rows = np.flatnonzero((time >= start_time) & (time < end_time))
     if len(rows) < MIN_ROWS:
@@ -74,7 +74,9 @@ def fit_friction_trend(
         rows = select_steady_rows_before_step(time, friction, start_time, end_time)
         if len(rows):
             moved = polynomial.polyvander(velocity * (time[rows] - end_time), 1)
-            line = fit_linear_model(time[rows], friction[rows], moved, noise_by_moments=True)
+            line = fit_linear_model(
+                time[rows], friction[rows], moved, estimate_noise_by_moments=True
+            )
             found.append((line.coefficients[1], math.sqrt(line.coefficient_covariance[1, 1])))
     return compute_weighted_mean(*np.array(found).T) if found else (0.0, 0.0)
 

@@ -64,7 +64,7 @@ _MAX_PEAK_CENTRING_ITERATIONS = 4
 #: The noise is estimated from rows before the hold whose sampling interval differs from the
 #: sampling interval after the hold by at most this factor. If there are too few such rows, the
 #: noise is estimated from the second half of the rows after the hold.
-_MAX_INTERVAL_RATIO_FOR_NOISE_ESTIMATE = 2.0
+_MAX_SAMPLING_INTERVAL_RATIO_FOR_NOISE = 2.0
 
 
 class Hold(NamedTuple):
@@ -115,17 +115,17 @@ class HoldQuantityEstimate(NamedTuple):
     """
 
     value: float
-    coefficient_weights: np.ndarray
+    derivatives_by_coefficient: np.ndarray
     additional_variance: float = 0.0
-    trend_derivative: float = 0.0
+    derivative_by_friction_trend: float = 0.0
 
     def subtract(self, other_estimate: HoldQuantityEstimate) -> HoldQuantityEstimate:
         """Return the difference of two estimates."""
         return HoldQuantityEstimate(
             self.value - other_estimate.value,
-            self.coefficient_weights - other_estimate.coefficient_weights,
+            self.derivatives_by_coefficient - other_estimate.derivatives_by_coefficient,
             self.additional_variance + other_estimate.additional_variance,
-            self.trend_derivative - other_estimate.trend_derivative,
+            self.derivative_by_friction_trend - other_estimate.derivative_by_friction_trend,
         )
 
 
@@ -280,14 +280,16 @@ class HoldFit:
             ) or (unknown, unknown)
         estimates = first, top, top.subtract(first), end.subtract(first), distance
         variances = (
-            e.coefficient_weights @ found.coefficient_covariance @ e.coefficient_weights
+            e.derivatives_by_coefficient
+            @ found.coefficient_covariance
+            @ e.derivatives_by_coefficient
             + e.additional_variance
             for e in estimates
         )
         return (
             [estimate.value for estimate in estimates],
             [math.sqrt(variance) for variance in variances],
-            [estimate.trend_derivative for estimate in estimates],
+            [estimate.derivative_by_friction_trend for estimate in estimates],
         )
 
     @cached_property
@@ -297,14 +299,14 @@ class HoldFit:
         if len(after) > 1:
             gaps = np.gradient(self.time)
             ratio = gaps[rows] / float(np.median(gaps[after]))
-            alike = np.abs(np.log(ratio)) < math.log(_MAX_INTERVAL_RATIO_FOR_NOISE_ESTIMATE)
+            alike = np.abs(np.log(ratio)) < math.log(_MAX_SAMPLING_INTERVAL_RATIO_FOR_NOISE)
             if alike.sum() >= MIN_ROWS:
                 rows = rows[alike]
             elif len(after) >= 2 * MIN_ROWS:
                 rows = after[len(after) // 2 :]
         u = rescale_to_minus_one_to_one(self.time[rows])
         return fit_linear_model(
-            self.time[rows], self.level[rows], np.vander(u, 3), noise_by_moments=True
+            self.time[rows], self.level[rows], np.vander(u, 3), estimate_noise_by_moments=True
         )
 
     def _compute_normalised_log_hold_time(self, rows: np.ndarray) -> np.ndarray:

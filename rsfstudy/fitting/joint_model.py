@@ -22,14 +22,14 @@ from rsfstudy.fitting.window_model import (
     FiniteDifferenceScheme,
     ParameterValues,
     WindowModel,
-    fit_parameters_to_scene_fields,
+    convert_fit_parameters_to_scene_fields,
     scene_to_parameters,
 )
 from rsfstudy.motion import MotionStopped
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-ValueType = TypeVar("ValueType")
+ParameterValueType = TypeVar("ValueType")
 #: Prefixes of the parameters that have a separate value in each window.
 _PER_WINDOW_PARAMETER_PREFIXES = ("mu_star", "step_time", "trend")
 
@@ -127,8 +127,8 @@ def strip_window_number(name: str) -> str:
 
 
 def select_values_of_window(
-    values_by_parameter_name: Mapping[str, ValueType], window_number: int
-) -> dict[str, ValueType]:
+    values_by_parameter_name: Mapping[str, ParameterValueType], window_number: int
+) -> dict[str, ParameterValueType]:
     """Select the values of the parameters of a window.
 
     Parameters
@@ -177,7 +177,7 @@ class JointModel:
     stiffness_ratios_to_first_window: tuple[float, ...] = ()
 
     @cached_property
-    def time_since_first_row_of_window(self) -> np.ndarray:
+    def time_since_start_of_each_window(self) -> np.ndarray:
         """Times of all rows in s, measured from the first row of each window."""
         return np.concatenate([part.time - part.time[0] for part in self.window_models])
 
@@ -187,7 +187,7 @@ class JointModel:
         return np.concatenate([part.recorded_friction for part in self.window_models])
 
     @property
-    def averaging_time(self) -> float:
+    def friction_averaging_time(self) -> float:
         """Averaging time of friction in s, or 0 if there is no averaging."""
         passed = self.window_models[0].friction_filter
         return passed.size if passed is not None and passed.kind not in LOW_PASS_ORDERS else 0.0
@@ -223,7 +223,7 @@ class JointModel:
             for part in self.window_models
         )
 
-    def find_longest_allowed_loading_delay(self, step_time_name: str) -> float:
+    def find_longest_allowed_loading_delay(self, step_time_parameter_name: str) -> float:
         """Return the largest loading delay that the model supports.
 
         Parameters
@@ -237,7 +237,7 @@ class JointModel:
             Largest delay of the loading in s, in the window whose step time has this name.
         """
         return self.window_models[
-            max(split_window_number(step_time_name)[1] - 1, 0)
+            max(split_window_number(step_time_parameter_name)[1] - 1, 0)
         ].longest_allowed_loading_delay
 
     def check_parameters_define_valid_scenes(self, parameter_values: ParameterValues) -> None:
@@ -355,7 +355,9 @@ class JointModel:
             blocks.append(block)
         return np.concatenate(blocks)
 
-    def compute_loading_error_sensitivity(self, parameter_values: ParameterValues) -> np.ndarray:
+    def compute_friction_change_by_loading_error(
+        self, parameter_values: ParameterValues
+    ) -> np.ndarray:
         """Compute the changes in friction due to errors of the loading.
 
         Parameters
@@ -372,7 +374,7 @@ class JointModel:
         return np.asarray(
             block_diag(
                 *(
-                    part.compute_loading_error_sensitivity(own)
+                    part.compute_friction_change_by_loading_error(own)
                     for part, own in self._iterate_window_models_with_values(parameter_values)
                 )
             )
@@ -429,4 +431,4 @@ def fitted_fields(
     if stiffness is not None:
         values["stiffness"] = stiffness
     values |= {n: value for n, value in select_values_of_window(found, 1).items() if n in values}
-    return fit_parameters_to_scene_fields(values, velocity)
+    return convert_fit_parameters_to_scene_fields(values, velocity)

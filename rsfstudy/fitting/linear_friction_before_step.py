@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
-from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums
+from rsfstudy.fitting.velocity_steps import CumulativeSumsForLineFits
 
 #: Limits for the amount of data. The first two values are the largest number of block averages of
 #: friction, and the smallest number of block averages in each of two lines. The third value is the
@@ -86,7 +86,9 @@ def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
         Index of the row at which the second line begins, or 0 if a single line is sufficient.
     """
     count = len(row_times)
-    sums = CumulativeLineFitSums(row_times - row_times[0], friction - friction[0], np.ones(count))
+    sums = CumulativeSumsForLineFits(
+        row_times - row_times[0], friction - friction[0], np.ones(count)
+    )
     places = np.arange(
         _MIN_BLOCK_AVERAGES_BESIDE_BREAK, count - _MIN_BLOCK_AVERAGES_BESIDE_BREAK + 1
     )

@@ -29,14 +29,14 @@ from rsfstudy.fitting.noise import (
     fit_noise_model,
 )
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
-from rsfstudy.fitting.uniform_sampling_runs import SamplingRun
+from rsfstudy.fitting.uniform_sampling_runs import UniformSamplingRun
 
 #: Number of times that the noise and the coefficients are estimated in turn.
 _NOISE_ESTIMATION_PASSES = 2
 #: A polynomial does not describe the samples if two further terms reduce the sum of squares by more
 #: than this number of noise variances. The limit is the 99.9 % quantile of the chi-squared
 #: distribution with two degrees of freedom.
-_MAX_SQUARES_REDUCTION_BY_HIGHER_TERMS = 13.8
+_MAX_CHI_SQUARED_OF_HIGHER_TERMS = 13.8
 #: Number of successive windows that may be rejected by chance. If more windows are rejected in
 #: succession, longer windows are not tested.
 _MAX_SUCCESSIVE_REJECTED_WINDOWS = 1
@@ -66,7 +66,11 @@ class GeneralisedLeastSquaresFit(NamedTuple):
 
 
 def fit_linear_model(
-    time: np.ndarray, values: np.ndarray, jacobian: np.ndarray, *, noise_by_moments: bool = False
+    time: np.ndarray,
+    values: np.ndarray,
+    jacobian: np.ndarray,
+    *,
+    estimate_noise_by_moments: bool = False,
 ) -> GeneralisedLeastSquaresFit:
     """Fit a linear model by generalised least squares.
 
@@ -100,7 +104,7 @@ def fit_linear_model(
         left = values - curve
         noise = (
             estimate_noise_model_by_moments(AUTOREGRESSIVE_NOISE_NAME, time, left, kept, least)[0]
-            if noise_by_moments
+            if estimate_noise_by_moments
             else fit_noise_model(AUTOREGRESSIVE_NOISE_NAME, time, left, jacobian, kept, least)
         )
         whitened = noise.whiten_columns(np.column_stack([jacobian, values]))
@@ -175,7 +179,7 @@ def choose_longest_polynomial_window(
     shortest: np.ndarray | None = None
     rejected = 0
     for rows in windows:
-        run = (SamplingRun(0, len(rows), 0, 0, 0),)
+        run = (UniformSamplingRun(0, len(rows), 0, 0, 0),)
         columns = polynomial.polyvander(rescale_to_minus_one_to_one(coordinate[rows]), degree + 2)
         whitened = NoiseModel(run, partial, np.ones(1)).whiten_columns(
             np.column_stack([columns, values[rows] - values[rows].mean()])
@@ -183,7 +187,7 @@ def choose_longest_polynomial_window(
         low, high = (
             _compute_polynomial_residual_squares(whitened, degree + more) for more in (0, 2)
         )
-        if low - high > _MAX_SQUARES_REDUCTION_BY_HIGHER_TERMS * noise_reference_fit.noise_sd**2:
+        if low - high > _MAX_CHI_SQUARED_OF_HIGHER_TERMS * noise_reference_fit.noise_sd**2:
             rejected += 1
             shortest = rows if shortest is None else shortest
             if rejected > _MAX_SUCCESSIVE_REJECTED_WINDOWS:

@@ -43,7 +43,7 @@ from rsfstudy.fitting.noise import (
     build_white_noise_model,
     fit_noise_model,
 )
-from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums, LoadingStep, noise_variance
+from rsfstudy.fitting.velocity_steps import CumulativeSumsForLineFits, LoadingStep, noise_variance
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 
 #: Kinds of locked portions of a record.
@@ -147,7 +147,7 @@ def measure_stiffness(
 
 def _build_stiffness_table(
     portion_rows: Sequence[tuple[str, float, float, float, float, float]],
-    trend_caused_error: float,
+    stiffness_error_from_trend: float,
     *,
     has_normal_stress: bool,
 ) -> xr.Dataset:
@@ -187,7 +187,7 @@ def _build_stiffness_table(
         mean, stderr = math.nan, math.nan
         if portion_rows:
             mean, stderr = compute_weighted_mean(each, spread)
-            stderr = math.hypot(stderr, trend_caused_error * float(scale.mean()))
+            stderr = math.hypot(stderr, stiffness_error_from_trend * float(scale.mean()))
         about = {"long_name": words, "units": units}
         of_error = {"long_name": f"standard error of the {words}", "units": units}
         table[f"portion_{name}"] = "portion", each, about
@@ -284,7 +284,7 @@ def _remove_rows_after_slip_onset(portion: LockedPortion) -> LockedPortion | Non
     if count < 2 * width:
         return None
     starts = np.arange(count - width + 1)
-    sums = CumulativeLineFitSums(x, y, np.ones(count))
+    sums = CumulativeSumsForLineFits(x, y, np.ones(count))
     _mt, _mx, squares, products, _xx = sums.compute_weighted_moments(starts, starts + width)
     slopes = products / squares
     # The fault is locked at the beginning, so the steepest slope is sought before friction has

@@ -45,11 +45,11 @@ from scipy.signal import lfilter
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.noise_correlation_from_averaging import NoiseCorrelationFromAveraging
 from rsfstudy.fitting.uniform_sampling_runs import (
-    SamplingRun,
+    UniformSamplingRun,
     count_noise_processes,
     expand_run_field_to_rows,
     find_noise_level_changes,
-    find_sampling_runs,
+    find_uniform_sampling_runs,
     split_runs_at_noise_level_changes,
 )
 from rsfstudy.fitting.whiteness_test import (
@@ -121,7 +121,7 @@ class NoiseModel:
         autoregressive correlation.
     """
 
-    sampling_runs: tuple[SamplingRun, ...]
+    uniform_sampling_runs: tuple[UniformSamplingRun, ...]
     partial_autocorrelations: np.ndarray
     relative_noise_levels: np.ndarray
     non_outlier_mask: np.ndarray | None = None
@@ -157,11 +157,11 @@ class NoiseModel:
         scaled = (
             sample_columns
             / self.relative_noise_levels[
-                expand_run_field_to_rows(self.sampling_runs, "noise_level_index")
+                expand_run_field_to_rows(self.uniform_sampling_runs, "noise_level_index")
             ][:, None]
         )
         found = np.empty_like(sample_columns)
-        for run in self.sampling_runs:
+        for run in self.uniform_sampling_runs:
             known = min(run.row_count_since_time_restart, self.autoregressive_order)
             part = scaled[run.start_row - known : run.stop_row]
             found[run.start_row : run.stop_row] = _compute_scaled_prediction_errors(
@@ -204,7 +204,7 @@ class NoiseModel:
             if self.correlation_from_averaging is None
             else self.correlation_from_averaging.correlation_log_determinant
         )
-        for first, last, number, before, level in self.sampling_runs:
+        for first, last, number, before, level in self.uniform_sampling_runs:
             variances = self.prediction_coefficients_and_variances[number][1]
             early = variances[
                 min(before, self.autoregressive_order) : min(
@@ -231,7 +231,8 @@ class NoiseModel:
         """
         power = self._zero_frequency_power_over_variance
         lasts = (
-            (run.stop_row - run.start_row, run.noise_process_index) for run in self.sampling_runs
+            (run.stop_row - run.start_row, run.noise_process_index)
+            for run in self.uniform_sampling_runs
         )
         each = (
             1.0
@@ -256,7 +257,7 @@ class NoiseModel:
         """
         total = 0.0
         rows = np.bincount(
-            expand_run_field_to_rows(self.sampling_runs, "noise_process_index")
+            expand_run_field_to_rows(self.uniform_sampling_runs, "noise_process_index")
         ).tolist()
         for count, told, power in zip(
             rows,
@@ -283,7 +284,7 @@ def build_white_noise_model(time: np.ndarray) -> NoiseModel:
     NoiseModel
         White noise model. All noise levels are equal to 1.
     """
-    runs = find_sampling_runs(time)
+    runs = find_uniform_sampling_runs(time)
     return NoiseModel(
         runs, np.zeros((count_noise_processes(runs), 0)), np.ones(count_noise_processes(runs))
     )
@@ -342,7 +343,7 @@ def fit_noise_model(
         )
         sizes = np.exp(np.append(0.0, logs))
         return NoiseModel(
-            begin.sampling_runs,
+            begin.uniform_sampling_runs,
             partial,
             np.maximum(sizes, min_noise_sd),
             non_outlier_mask,
@@ -355,7 +356,7 @@ def fit_noise_model(
         if begin.correlation_from_averaging is None
         else begin.correlation_from_averaging.whiten_columns(columns)
     )
-    products = _LaggedProductSums(begin.sampling_runs, columns, order)
+    products = _LaggedProductSums(begin.uniform_sampling_runs, columns, order)
 
     def misfit(x: np.ndarray) -> float:
         return products.compute_restricted_likelihood_objective(noise(x))
@@ -416,7 +417,7 @@ def estimate_noise_model_by_moments(
         1e-300,
     )
     found, first = _estimate_noise_of_runs_by_moments(
-        noise_model_name, find_sampling_runs(time), residuals, min_noise_sd
+        noise_model_name, find_uniform_sampling_runs(time), residuals, min_noise_sd
     )
     return replace(
         found, non_outlier_mask=non_outlier_mask, correlation_from_averaging=overlap
@@ -425,7 +426,7 @@ def estimate_noise_model_by_moments(
 
 def _estimate_noise_of_runs_by_moments(
     noise_model_name: str,
-    sampling_runs: tuple[SamplingRun, ...],
+    sampling_runs: tuple[UniformSamplingRun, ...],
     residuals: np.ndarray,
     min_noise_sd: float,
 ) -> tuple[NoiseModel, float]:
@@ -472,7 +473,7 @@ def _estimate_noise_of_runs_by_moments(
         runs = split_runs_at_noise_level_changes(sampling_runs, knots)
     first = float(found.relative_noise_levels[0])
     return NoiseModel(
-        found.sampling_runs,
+        found.uniform_sampling_runs,
         found.partial_autocorrelations,
         found.relative_noise_levels / first,
     ), first
@@ -496,7 +497,10 @@ class _LaggedProductSums:
     """
 
     def __init__(
-        self, sampling_runs: Sequence[SamplingRun], columns: np.ndarray, autoregressive_order: int
+        self,
+        sampling_runs: Sequence[UniformSamplingRun],
+        columns: np.ndarray,
+        autoregressive_order: int,
     ) -> None:
         self.row_count, self.parameter_count = len(columns), columns.shape[1] - 1
         # The derivatives may be almost linearly dependent, so they are replaced by an orthonormal

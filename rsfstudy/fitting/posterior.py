@@ -103,7 +103,7 @@ def sample_posterior_fit_coordinates(
 
     halts: list[MotionStopped] = []
     errors = multivariate_t(
-        fit_problem.parameter_values_to_fit_coordinates(fit_solution.parameter_values),
+        fit_problem.compute_fit_coordinates(fit_solution.parameter_values),
         fit_solution.fit_coordinate_covariance,
         _PROPOSAL_DEGREES_OF_FREEDOM,
         allow_singular=True,
@@ -114,7 +114,7 @@ def sample_posterior_fit_coordinates(
             return -math.inf
         try:
             left = fit_problem.compute_residuals(
-                fit_problem.fit_coordinates_to_parameter_values(x), require_stable=True
+                fit_problem.compute_parameter_values(x), require_stable=True
             )
         except MotionStopped as halt:
             halts.append(halt)

@@ -36,9 +36,9 @@ MIN_SAMPLES = MIN_WINDOW_SAMPLES * MIN_RECORD_OVER_WINDOW_LENGTH
 DETECTION_MARGIN_IN_STANDARD_DEVIATIONS = 3.1
 #: A stress drop starts and ends where the difference between the mean stresses before and after a
 #: sample is equal to this number of standard deviations.
-_DROP_EXTENT_THRESHOLD_SIGMAS = 2.0
+_DROP_START_AND_END_THRESHOLD_SIGMAS = 2.0
 #: The noise is estimated from the shortest interval that contains this fraction of the values.
-_FRACTION_OF_VALUES_IN_SHORTEST_INTERVAL = 0.4
+_VALUE_FRACTION_FOR_NOISE_ESTIMATE = 0.4
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
 #: A record is resampled if the ratio of its longest to its shortest sampling interval exceeds this
@@ -109,8 +109,8 @@ class Detection(NamedTuple):
 
     candidates: list[StressDropCandidate]
     noise_sd: float
-    detectable_drop: float
-    max_decrease: float
+    min_detectable_drop: float
+    max_moving_average_decrease: float
 
 
 def estimate_robust_sd(samples: np.ndarray) -> float:
@@ -166,12 +166,12 @@ def fit_gaussian_to_most_frequent_values(values: np.ndarray) -> tuple[float, flo
         Standard deviation of the Gaussian distribution.
     """
     ordered = np.sort(values)
-    count = max(int(_FRACTION_OF_VALUES_IN_SHORTEST_INTERVAL * len(ordered)), 1)
+    count = max(int(_VALUE_FRACTION_FOR_NOISE_ESTIMATE * len(ordered)), 1)
     widths = ordered[count:] - ordered[:-count]
     first = int(np.argmin(widths))
     middle = 0.5 * float(ordered[first] + ordered[first + count])
     return middle, float(widths[first]) / (
-        2.0 * float(norm.ppf(0.5 + 0.5 * _FRACTION_OF_VALUES_IN_SHORTEST_INTERVAL))
+        2.0 * float(norm.ppf(0.5 + 0.5 * _VALUE_FRACTION_FOR_NOISE_ESTIMATE))
     )
 
 
@@ -380,7 +380,7 @@ class _WindowMeanDifferences:
         ]
         complete = ~np.any(better, axis=0) if better else np.ones(len(peaks), dtype=bool)
         least = min(
-            _DROP_EXTENT_THRESHOLD_SIGMAS * self.decrease_standard_deviation,
+            _DROP_START_AND_END_THRESHOLD_SIGMAS * self.decrease_standard_deviation,
             self.detection_threshold,
         )
         below = np.flatnonzero(padded <= least)

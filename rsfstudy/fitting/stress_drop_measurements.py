@@ -66,7 +66,7 @@ class DropMeasurements(NamedTuple):
         if the rate was not checked. Otherwise, the value is False.
     """
 
-    event_rows: list[EventNumbers]
+    quantities_of_each_drop: list[EventNumbers]
     detection: Detection
     displacement_shows_slip: bool
 

@@ -28,10 +28,10 @@ MIN_RELATIVE_NORMAL_STRESS_CHANGE, _MIN_NORMAL_STRESS_CHANGE_SIGMAS = 0.02, 6.0
 #: Largest difference between the normal stress in a short window and the normal stress in a long
 #: window next to a change in normal stress. The difference is relative to the change. If the
 #: difference is larger, the change belongs to a longer ramp.
-_MAX_STRESS_LEVEL_DRIFT_OVER_CHANGE = 0.25
+_MAX_STRESS_DRIFT_OVER_STRESS_CHANGE = 0.25
 #: A difference between the normal stresses of successive windows belongs to a step if it exceeds
 #: this fraction of the smallest detectable change.
-_MIN_DIFFERENCE_OVER_DETECTABLE_CHANGE = 0.4
+_MIN_STEP_OVER_DETECTABLE_STRESS_CHANGE = 0.4
 #: Settings of the step detection: the largest number of rows, the numbers of windows per record,
 #: and the smallest number of rows per window. Longer records are first averaged over blocks of
 #: rows.
@@ -97,7 +97,7 @@ def find_normal_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> lis
             change = abs(after - before)
             goes_on = (
                 max(abs(before - lasting[0]), abs(after - lasting[1]))
-                > _MAX_STRESS_LEVEL_DRIFT_OVER_CHANGE * change
+                > _MAX_STRESS_DRIFT_OVER_STRESS_CHANGE * change
             )
             if change > MIN_RELATIVE_NORMAL_STRESS_CHANGE * abs(before) and not goes_on:
                 found.append((rows, _fit_linear_stress_ramp(t[rows], s[rows], before, after)))
@@ -144,7 +144,7 @@ def _find_stress_level_changes(stress: np.ndarray, window_rows: int) -> list[sli
     for signed in (change, -change):
         joined: list[slice] = []
         for (rows,) in find_objects(
-            label(signed > _MIN_DIFFERENCE_OVER_DETECTABLE_CHANGE * least)[0]
+            label(signed > _MIN_STEP_OVER_DETECTABLE_STRESS_CHANGE * least)[0]
         ):
             # Noise may interrupt a ramp.
             if joined and rows.start < joined[-1].stop + window_rows:

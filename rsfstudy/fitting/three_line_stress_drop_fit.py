@@ -36,7 +36,7 @@ _SIDE_LENGTH_IN_WINDOWS, _SIDE_LENGTH_IN_DROP_DURATIONS, _MIN_SIDE_SAMPLES, _MAX
 _MAX_SAMPLES_IN_FIT = 300
 #: Longest time between a detected drop and the fitted start or end of the drop, in durations of the
 #: averaging window.
-_DROP_TIME_SEARCH_MARGIN_IN_WINDOWS = 2.0
+_SEARCH_MARGIN_OVER_WINDOW_DURATION = 2.0
 #: Number of start times (and of end times) in each search grid, and number of refinements of the
 #: search grid.
 _SEARCH_GRID_SIZE, _SEARCH_GRID_REFINEMENTS = 16, 3
@@ -54,7 +54,7 @@ _TIME_INTERVAL_EXCESS_SQUARES, _SIZE_INTERVAL_EXCESS_SQUARES = 7.4, 3.84
 #: Half width of a 95 % confidence interval in standard errors.
 HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS = 1.96
 #: Error of a time that lies between two samples, relative to the sampling interval.
-_START_TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
+_TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
 #: Smallest number of samples that are required for estimating the stress before a drop, or the
 #: stress after a drop.
 _MIN_SAMPLES_BESIDE_DROP = 3
@@ -199,7 +199,7 @@ def fit_stress_drop(
         end_time=origin + scale * t1,
         stress_before=float(lines.line_coefficients[best, 0]),
         stress_after=float(lines.line_coefficients[best, 1]),
-        start_time_error=scale * (float(late[0]) + _START_TIME_ERROR_OVER_SAMPLING_INTERVAL * gap0),
+        start_time_error=scale * (float(late[0]) + _TIME_ERROR_OVER_SAMPLING_INTERVAL * gap0),
         end_time_error=scale * (float(late[1]) + gap1),
         stress_before_error=float(of_before + spread),
         stress_after_error=float(of_after + spread),
@@ -251,7 +251,7 @@ def _search_drop_start_and_end_times(
     best pair.
     """
     reach = max(
-        _DROP_TIME_SEARCH_MARGIN_IN_WINDOWS * window_duration, end_time_guess - start_time_guess
+        _SEARCH_MARGIN_OVER_WINDOW_DURATION * window_duration, end_time_guess - start_time_guess
     )
     halves = np.sort(np.concatenate([time, 0.5 * (time[1:] + time[:-1])]))
     starts = halves[(halves >= start_time_guess - reach) & (halves < end_time_guess)]

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 #: Two sampling intervals belong to different classes if their ratio exceeds this value.
-_MAX_INTERVAL_RATIO_WITHIN_CLASS = 2.0
+_MAX_SAMPLING_INTERVAL_RATIO_IN_CLASS = 2.0
 #: Number of rows in the running mean of the sampling intervals, smallest number of rows of a class
 #: with a separate noise process, and smallest number of rows of a run.
 _RUNNING_MEAN_ROWS, _MIN_ROWS_PER_NOISE_PROCESS, _MIN_ROWS_PER_SAMPLING_RUN = 15, 100, 30
@@ -34,7 +34,7 @@ _RUNNING_MEAN_ROWS, _MIN_ROWS_PER_NOISE_PROCESS, _MIN_ROWS_PER_SAMPLING_RUN = 15
 _VARIANCE_OF_LOG_ABSOLUTE_GAUSSIAN, _MIN_ABSOLUTE_VALUE_OVER_RMS = math.pi**2 / 8.0, 0.01
 
 
-class SamplingRun(NamedTuple):
+class UniformSamplingRun(NamedTuple):
     """Consecutive rows with the same sampling interval and noise level.
 
     Parameters
@@ -56,7 +56,7 @@ class SamplingRun(NamedTuple):
     noise_level_index: int
 
 
-def find_sampling_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
+def find_uniform_sampling_runs(time: np.ndarray) -> tuple[UniformSamplingRun, ...]:
     """Find runs of consecutive rows with the same sampling interval.
 
     A new run also begins when the clock restarts, for example between the windows of a joint fit.
@@ -77,13 +77,15 @@ def find_sampling_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
     found, begun = [], 0
     for first, last in itertools.pairwise([0, *bounds, len(time)]):
         begun = first if first and begins[first - 1] else begun
-        found.append(SamplingRun(first, last, int(kinds[first]), first - begun, int(kinds[first])))
+        found.append(
+            UniformSamplingRun(first, last, int(kinds[first]), first - begun, int(kinds[first]))
+        )
     return tuple(found)
 
 
 def split_runs_at_noise_level_changes(
-    runs: Sequence[SamplingRun], change_rows: Sequence[int]
-) -> tuple[SamplingRun, ...]:
+    sampling_runs: Sequence[UniformSamplingRun], change_rows: Sequence[int]
+) -> tuple[UniformSamplingRun, ...]:
     """Split sampling runs at changes in the noise level.
 
     Parameters
@@ -98,9 +100,9 @@ def split_runs_at_noise_level_changes(
     tuple of SamplingRun
         Runs of rows. Between two changes, each noise process has a separate noise level.
     """
-    found: list[SamplingRun] = []
+    found: list[UniformSamplingRun] = []
     levels: dict[tuple[int, int], int] = {}
-    for run in runs:
+    for run in sampling_runs:
         inside = [
             k
             for k in change_rows
@@ -112,7 +114,7 @@ def split_runs_at_noise_level_changes(
             segment = sum(k <= first for k in change_rows)
             level = levels.setdefault((segment, run.noise_process_index), len(levels))
             found.append(
-                SamplingRun(
+                UniformSamplingRun(
                     first,
                     last,
                     run.noise_process_index,
@@ -123,7 +125,7 @@ def split_runs_at_noise_level_changes(
     return tuple(found)
 
 
-def count_noise_processes(runs: Sequence[SamplingRun]) -> int:
+def count_noise_processes(sampling_runs: Sequence[UniformSamplingRun]) -> int:
     """Return the number of noise processes in a sequence of runs.
 
     Parameters
@@ -136,10 +138,12 @@ def count_noise_processes(runs: Sequence[SamplingRun]) -> int:
     int
         Number of noise processes.
     """
-    return 1 + max(run.noise_process_index for run in runs)
+    return 1 + max(run.noise_process_index for run in sampling_runs)
 
 
-def expand_run_field_to_rows(runs: Sequence[SamplingRun], run_field_name: str) -> np.ndarray:
+def expand_run_field_to_rows(
+    sampling_runs: Sequence[UniformSamplingRun], run_field_name: str
+) -> np.ndarray:
     """Return the index of the noise process or the noise level of each row.
 
     Parameters
@@ -155,8 +159,8 @@ def expand_run_field_to_rows(runs: Sequence[SamplingRun], run_field_name: str) -
         Index of the noise process, or of the noise level, for each row.
     """
     return np.repeat(
-        [getattr(run, run_field_name) for run in runs],
-        [run.stop_row - run.start_row for run in runs],
+        [getattr(run, run_field_name) for run in sampling_runs],
+        [run.stop_row - run.start_row for run in sampling_runs],
     )
 
 
@@ -255,7 +259,7 @@ def _classify_sampling_intervals(time: np.ndarray) -> np.ndarray:
     gaps = np.diff(time)
     gaps[gaps <= 0.0] = np.median(gaps)
     smooth = np.log(uniform_filter1d(gaps, min(_RUNNING_MEAN_ROWS, len(gaps)), mode="nearest"))
-    kinds = np.rint((smooth - np.median(smooth)) / math.log(_MAX_INTERVAL_RATIO_WITHIN_CLASS))
+    kinds = np.rint((smooth - np.median(smooth)) / math.log(_MAX_SAMPLING_INTERVAL_RATIO_IN_CLASS))
     kinds = np.append(kinds[:1], kinds)
     lasts = np.diff([0, *(np.flatnonzero(np.diff(kinds)) + 1), len(kinds)])
     steady = np.repeat(lasts, lasts) >= _MIN_ROWS_PER_SAMPLING_RUN

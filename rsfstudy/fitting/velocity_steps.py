@@ -142,7 +142,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
         return ()
     t0, x0 = t[0], x[0]
     variance, louder = noise_variance(t, x), _compute_local_over_global_noise(t, x)
-    sums = CumulativeLineFitSums(t - t0, x - x0, 1.0 / louder**2)
+    sums = CumulativeSumsForLineFits(t - t0, x - x0, 1.0 / louder**2)
     knots = sorted(
         split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
     )
@@ -185,7 +185,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     return tuple(found)
 
 
-class CumulativeLineFitSums:
+class CumulativeSumsForLineFits:
     """Cumulative sums for fitting lines to any range of rows.
 
     The computing time of a fit does not depend on the number of rows in the range. In all methods,
@@ -405,7 +405,7 @@ def split_rows_into_segments(
 
 
 def _merge_similar_segments(
-    line_fit_sums: CumulativeLineFitSums,
+    line_fit_sums: CumulativeSumsForLineFits,
     segment_boundaries: list[int],
     time: np.ndarray,
     variance_of_noise: float,
@@ -477,7 +477,7 @@ def _refine_line_intersection_time(
     middle = int(np.searchsorted(time, initial_time))
     i, j = max(middle - 20 * row_reach, 0), min(middle + 20 * row_reach, len(time))
     t, x = time[i:j] - initial_time, displacement[i:j]
-    sums = CumulativeLineFitSums(t, x - x[0], np.ones(j - i))
+    sums = CumulativeSumsForLineFits(t, x - x[0], np.ones(j - i))
     places = np.arange(_MIN_SEGMENT_ROWS, j - i - _MIN_SEGMENT_ROWS)
     both = sums.compute_line_residual_squares(0, places) + sums.compute_line_residual_squares(
         places, j - i

@@ -16,7 +16,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.filters import Filter
-from rsfstudy.motion import Integrator, MotionStopped, Recording
+from rsfstudy.motion import Integrator, MotionRecorder, MotionStopped
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider import SampledHistory, Scene, replace_field_values
 from rsfstudy.status import Status
@@ -68,7 +68,7 @@ PARAMETER_SYNONYMS = {
     **dict.fromkeys(("t0", "step"), "step_time"),
 }
 #: Parameters that only some friction laws have.
-PARAMETERS_OF_SOME_LAWS_ONLY = frozenset({"b", "b1", "b2", "slip_distance_2", "law_exponent"})
+LAW_SPECIFIC_PARAMETERS = frozenset({"b", "b1", "b2", "slip_distance_2", "law_exponent"})
 #: Names of the parameters that the fit varies on a logarithmic scale.
 LOGARITHMIC_PARAMETERS = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
 #: Finite differences for the search and for the final solution. Simulated friction is reproducible
@@ -281,7 +281,9 @@ class WindowModel:
         history = SampledHistory.from_table(columns, self.has_normal_stress_change, "record")
         parts = self.scene.parts._replace(loading=history)
         return Scene(
-            replace_field_values(parts, fit_parameters_to_scene_fields(parameter_values, velocity))
+            replace_field_values(
+                parts, convert_fit_parameters_to_scene_fields(parameter_values, velocity)
+            )
         )
 
     def compute_model_friction(
@@ -343,11 +345,13 @@ class WindowModel:
             late = parameter_values.get("step_time", 0.0)
             scale = self.initial_velocity / parameter_values["slip_distance"]
             times = (
-                self.friction_filter.sample_times(self.time) if self.friction_filter else self.time
+                self.friction_filter.compute_required_sample_times(self.time)
+                if self.friction_filter
+                else self.time
             )
             at = np.maximum(times - late - self.loading_segments[0, 0], 0.0) * scale
             integrator = self.integrator.refined() if with_refined_tolerances else self.integrator
-            recording, end = Recording(sample_times=at), float(at[-1]) * (1.0 + 1e-12)
+            recording, end = MotionRecorder(sample_times=at), float(at[-1]) * (1.0 + 1e-12)
             self.integrator.work_meter.budget = min(budget, self.integrator.evaluations + most)
             for _event in integrator.follow(scene, recording=recording, until=end):
                 pass
@@ -362,7 +366,7 @@ class WindowModel:
             return nothing
         finally:
             self.integrator.work_meter.budget = budget
-        found = Recording.get_friction_coefficient(recording.as_table(scene))
+        found = MotionRecorder.get_friction_coefficient(recording.as_table(scene))
         if len(found) != len(times):
             return nothing
         return self.friction_filter.apply(self.time, found) if self.friction_filter else found
@@ -388,7 +392,9 @@ class WindowModel:
             (c * self.load_point_displacement**n for n, c in powers), np.zeros(len(self.time))
         )
 
-    def compute_loading_error_sensitivity(self, parameter_values: ParameterValues) -> np.ndarray:
+    def compute_friction_change_by_loading_error(
+        self, parameter_values: ParameterValues
+    ) -> np.ndarray:
         """Compute the changes in friction due to errors of the loading.
 
         Parameters
@@ -595,7 +601,7 @@ def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dic
     return found | {name: stated[name] for name in named if stated.get(name) is not None}
 
 
-def fit_parameters_to_scene_fields(
+def convert_fit_parameters_to_scene_fields(
     parameter_values: ParameterValues, velocity_unit: float
 ) -> dict[str, float]:
     """Convert fit parameters with units to dimensionless scene fields.
@@ -666,7 +672,7 @@ def shift_parameter(
     return {**parameter_values, parameter_name: moved}
 
 
-def parameter_to_fit_coordinate(parameter_name: str, parameter_value: float) -> float:
+def convert_parameter_to_fit_coordinate(parameter_name: str, parameter_value: float) -> float:
     """Convert the value of a parameter to its fit coordinate.
 
     Parameters
@@ -687,7 +693,7 @@ def parameter_to_fit_coordinate(parameter_name: str, parameter_value: float) -> 
     )
 
 
-def fit_coordinate_to_parameter(parameter_name: str, fit_coordinate: float) -> float:
+def convert_fit_coordinate_to_parameter(parameter_name: str, fit_coordinate: float) -> float:
     """Convert a fit coordinate of a parameter to the value of the parameter.
 
     Parameters

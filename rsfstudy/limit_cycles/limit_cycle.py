@@ -46,8 +46,8 @@ from rsfstudy.measure_base import (
 from rsfstudy.motion import (
     Accuracy,
     Integrator,
+    MotionRecorder,
     MotionStopped,
-    Recording,
     resample_motion_along_path,
 )
 from rsfstudy.parts import Segment
@@ -61,7 +61,7 @@ _MIN_ESTIMATED_ERROR_OVER_RTOL = 0.06
 #: Displacement of the load point that starts a motion if the scene has no step, in units of D_c.
 INITIAL_PERTURBATION_DISPLACEMENT = 0.1
 #: Number of recorded points if only the two ends of an orbit are stored.
-_POINT_COUNT_OF_UNRECORDED_CYCLE = 2
+_POINT_COUNT_IF_ONLY_ENDS_ARE_STORED = 2
 #: Relative accuracy of the search for the limit cycle. After the search, the orbit is refined to
 #: the requested accuracy.
 _CYCLE_SEARCH_RTOL = 1e-4
@@ -119,7 +119,7 @@ _LIMIT_CYCLE_OUTPUTS = (
         "long-term behaviour of the slider, classified by the peak slip rate",
         flags=SLIP_MODE_NAMES,
     ),
-    *create_outputs_along_phase(*Recording.MOTION_VARIABLE_NAMES),
+    *create_outputs_along_phase(*MotionRecorder.MOTION_VARIABLE_NAMES),
 )
 
 
@@ -281,7 +281,7 @@ class LimitCycle(RecordingMeasure):
         fine = ReturnMap(
             scene,
             integrator.refined(),
-            recorded=self.phases > _POINT_COUNT_OF_UNRECORDED_CYCLE,
+            recorded=self.phases > _POINT_COUNT_IF_ONLY_ENDS_ARE_STORED,
         )
         again = one and fine.refine_periodic_orbit(one)
         if one is None or again is None:

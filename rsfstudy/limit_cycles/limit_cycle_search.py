@@ -63,7 +63,7 @@ from rsfstudy.status import Status
 _MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
 #: Maximum change in the range of ln V by a leap to the extrapolated fixed point, as a fraction of
 #: the range of ln V.
-_MAX_FIXED_POINT_LEAP_OVER_LOG_RATE_RANGE = 0.1
+_MAX_EXTRAPOLATION_OVER_LOG_RATE_RANGE = 0.1
 #: Maximum number of cycles after which a periodic motion repeats.
 MAX_PERIOD_IN_CYCLES = 16
 #: Largest relative tolerance for the difference between the two ends of an orbit. The limit is
@@ -159,7 +159,7 @@ class LimitCycleSearch:
                         f"{self._nearly_critical_stiffness_message}. {remedy}"
                     )
                     raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
-                if self._should_leap_to_fixed_point():
+                if self._should_extrapolate_to_fixed_point():
                     self._distance_at_leap = abs(
                         cycle.end_point.spring_stress - cycle.start_point.spring_stress
                     )
@@ -280,7 +280,7 @@ class LimitCycleSearch:
         )
         return before * last <= 0.0 and abs(last) <= near
 
-    def _should_leap_to_fixed_point(self) -> bool:
+    def _should_extrapolate_to_fixed_point(self) -> bool:
         """Return True if the search should leap to the extrapolated fixed point.
 
         The search does not leap to the extrapolated fixed point if the next cycle would come
@@ -298,7 +298,7 @@ class LimitCycleSearch:
         slowest, fastest = self._image_correction[-2:]
         return (
             LN10 * abs(fastest - slowest)
-            < _MAX_FIXED_POINT_LEAP_OVER_LOG_RATE_RANGE * cycle.log_slip_rate_range
+            < _MAX_EXTRAPOLATION_OVER_LOG_RATE_RANGE * cycle.log_slip_rate_range
         )
 
 

@@ -49,13 +49,13 @@ from rsfstudy.limit_cycles.stick_slip_cycles import (
     StickSlipCycle,
     iterate_stick_slip_cycles,
 )
-from rsfstudy.motion import Accuracy, Integrator, MotionStopped, Recording
+from rsfstudy.motion import Accuracy, Integrator, MotionRecorder, MotionStopped
 from rsfstudy.slider import FloatTuple, MotionPoint, Scene
 from rsfstudy.status import Status
 
 #: Step of the finite differences of the return map, divided by the product of a and the range of ln
 #: V. The derivatives of the return map vary on a scale of a hundredth of this product.
-DIFFERENCE_STEP_OVER_LOG_RATE_RANGE = 1e-4
+FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE = 1e-4
 _FINITE_DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
 #: Two limits of the search for an orbit. The first limit is the maximum distance of the orbit from
 #: the starting point of the search, divided by the product of a and the range of ln V. The second
@@ -91,10 +91,10 @@ class PeriodicOrbit:
 
     cycles: tuple[StickSlipCycle, ...]
     return_map_derivatives_per_cycle: tuple[np.ndarray, ...]
-    start_section_correction: np.ndarray
+    offset_to_closed_orbit: np.ndarray
     integration_accuracy: Accuracy
     rhs_evaluation_count: int
-    recording: Recording | None = None
+    recording: MotionRecorder | None = None
 
     @property
     def period_in_cycles(self) -> int:
@@ -105,15 +105,15 @@ class PeriodicOrbit:
     def start_section_coordinates(self) -> np.ndarray:
         """Section at which the closed orbit begins."""
         return np.asarray(
-            extract_section_coordinates(self.cycles[0].start_point) + self.start_section_correction
+            extract_section_coordinates(self.cycles[0].start_point) + self.offset_to_closed_orbit
         )
 
     @cached_property
     def primary_output_corrections(self) -> np.ndarray:
         """Corrections of the main results for the closure error."""
         return np.asarray(
-            self.return_map_derivatives_per_cycle[0][len(self.start_section_correction) :]
-            @ self.start_section_correction
+            self.return_map_derivatives_per_cycle[0][len(self.offset_to_closed_orbit) :]
+            @ self.offset_to_closed_orbit
         )
 
     @cached_property
@@ -153,7 +153,7 @@ class PeriodicOrbit:
             start_section_correction=multiply_return_map_derivatives(
                 self.return_map_derivatives_per_cycle[:at]
             )
-            @ self.start_section_correction,
+            @ self.offset_to_closed_orbit,
         )
 
 
@@ -284,12 +284,12 @@ class ReturnMap:
             else point
         )
 
-    def _inertia_matters_at(self, point: MotionPoint) -> bool:
+    def _inertia_matters_at(self, motion_point: MotionPoint) -> bool:
         """Return True if inertia is too important for the slow manifold."""
-        return self.integrator.inertia_matters_at(self.scene, point)
+        return self.integrator.inertia_matters_at(self.scene, motion_point)
 
     def follow_cycles(
-        self, start_section: np.ndarray, cycle_count: int, recording: Recording | None = None
+        self, start_section: np.ndarray, cycle_count: int, recording: MotionRecorder | None = None
     ) -> list[StickSlipCycle]:
         """Compute successive cycles from a section.
 
@@ -366,7 +366,7 @@ class ReturnMap:
         """
         found, step = (
             list[np.ndarray](),
-            DIFFERENCE_STEP_OVER_LOG_RATE_RANGE
+            FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE
             * math.sqrt(self.integrator.accuracy.refinement)
             * state_scale,
         )
@@ -387,7 +387,7 @@ class ReturnMap:
         return tuple(found)
 
     def compute_motion_direction_and_image_change(
-        self, point: MotionPoint
+        self, motion_point: MotionPoint
     ) -> tuple[FloatTuple, FloatTuple]:
         """Compute the direction of the motion at a section, and its effect on the image.
 
@@ -408,12 +408,12 @@ class ReturnMap:
             Change of the image (next section and main results) due to a displacement of the section
             along the motion.
         """
-        scene, states = self.scene, len(point.psis)
-        spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
+        scene, states = self.scene, len(motion_point.psis)
+        spring_stress = motion_point.frictional_stress + scene.dynamics.radiated_stress(
             scene.log_load_velocity
         )
         rates = scene.equations_without_mass(with_time=True).evaluate_rates(
-            (spring_stress, *point.psis, 0.0)
+            (spring_stress, *motion_point.psis, 0.0)
         )
         rest = (0.0,) * (PRIMARY_OUTPUT_COUNT_PER_CYCLE - 1)
         return (0.0, *rates[1:-1]), (*(0.0,) * (1 + states), -rates[-1], *rest)
@@ -557,7 +557,7 @@ class ReturnMap:
         for _ in range(_MAX_ITERATIONS):
             spent, recording = (
                 self.integrator.evaluations,
-                Recording() if self._with_recording else None,
+                MotionRecorder() if self._with_recording else None,
             )
             seen = self.follow_cycles(at, len(return_map_derivatives_per_cycle), recording)
             if len(seen) < len(return_map_derivatives_per_cycle):

@@ -22,7 +22,7 @@ from rsfstudy.motion import (
     EventKind,
     EventSpecification,
     Integrator,
-    Recording,
+    MotionRecorder,
     approach_to_steady_state,
     fall,
     maximum,
@@ -46,7 +46,7 @@ _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter
 MIN_LOG_SLIP_RATE_RANGE, _MIN_SHRINKING_CYCLES = 1e-3, 30
 #: A motion has settled if its distance from steady sliding is less than this fraction of the
 #: largest distance from steady sliding during the motion.
-_SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-6
+_SETTLED_DISTANCE_OVER_MAX_DISTANCE = 1e-6
 
 
 class StickSlipCycle(NamedTuple):
@@ -130,7 +130,7 @@ def iterate_stick_slip_cycles(
     scene: Scene,
     integrator: Integrator,
     start_point: MotionPoint | None,
-    recording: Recording | None = None,
+    recording: MotionRecorder | None = None,
 ) -> Iterator[StickSlipCycle | None]:
     """Iterate over the cycles of a motion.
 
@@ -152,7 +152,7 @@ def iterate_stick_slip_cycles(
         The next cycle. If the last item is None, the motion has settled to steady sliding.
     """
     begin, begun, fallen, seen = None, 0.0, start_point is None, list[Event]()
-    ahead = 0 if start_point else scene.parts.loading.reported_segment_count
+    ahead = 0 if start_point else scene.parts.loading.reported_segment_start_count
     swings, asked = list[float](), _build_cycle_event_specifications(scene.log_load_velocity)
     motion = integrator.follow(scene, asked, start=start_point, with_time=True, recording=recording)
     for event in motion:
@@ -183,7 +183,7 @@ def iterate_stick_slip_cycles(
         begin, begun, fallen, seen = event.point, event.time, False, []
 
 
-def suggest_raising_event_limit(event_count: int, option_name: str = "events") -> str:
+def suggest_raising_event_limit(event_limit: int, option_name: str = "events") -> str:
     """Return the part of a message that advises the user to allow more events.
 
     Parameters
@@ -198,11 +198,11 @@ def suggest_raising_event_limit(event_count: int, option_name: str = "events") -
     str
         Advice with the command-line option and the field.
     """
-    return f"To compute more events, pass --set {option_name}={2 * event_count} ({option_name}=)"
+    return f"To compute more events, pass --set {option_name}={2 * event_limit} ({option_name}=)"
 
 
 def extract_recorded_rows_of_cycles(
-    scene: Scene, cycles: Sequence[StickSlipCycle], recording: Recording | None
+    scene: Scene, cycles: Sequence[StickSlipCycle], recording: MotionRecorder | None
 ) -> np.ndarray:
     """Return the recorded samples of successive cycles.
 
@@ -232,9 +232,9 @@ def extract_recorded_rows_of_cycles(
     slip = (
         scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
     )
-    last = Recording.convert_point_to_row(scene, passed, slip, end, 0)
+    last = MotionRecorder.convert_point_to_row(scene, passed, slip, end, 0)
     if recording is None:
-        return np.stack([Recording.convert_point_to_row(scene, 0.0, 0.0, begin, 0), last])
+        return np.stack([MotionRecorder.convert_point_to_row(scene, 0.0, 0.0, begin, 0), last])
     # The last integration step extends beyond the end of the last cycle.
     return recording.as_table_up_to_row(scene, last)
 
@@ -247,7 +247,7 @@ def _build_cycle_event_specifications(log_load_velocity: float) -> tuple[EventSp
         minimum("log_slip_rate", may_report_later=True),
         rise("log_slip_rate", log_load_velocity),
         fall("log_slip_rate", log_load_velocity, may_report_later=True),
-        approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE),
+        approach_to_steady_state(_SETTLED_DISTANCE_OVER_MAX_DISTANCE),
     )
 
 

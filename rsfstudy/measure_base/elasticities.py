@@ -20,7 +20,7 @@ from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.status import Status
 
 #: Fields of a scene that hold numbers.
-NUMERIC_SCENE_FIELDS = tuple(
+NUMERIC_SCENE_FIELD_NAMES = tuple(
     name for name, kind in SceneFields.TYPES.items() if kind in (float, float | None)
 )
 #: Scene fields of shear heating, thermal pressurisation and flash heating. By default,
@@ -77,8 +77,8 @@ class _LogValueWithError(NamedTuple):
     The error is the error of y divided by ``|y|``.
     """
 
-    value: float
-    error: float
+    log_value: float
+    log_value_error: float
 
 
 @wrap_methods_in_error_boundary
@@ -184,7 +184,7 @@ class Elasticities(Measure):
     @cached_property
     def _differentiable_parameter_names(self) -> tuple[str, ...]:
         return tuple(
-            name for name in NUMERIC_SCENE_FIELDS if name not in self.measure.solved_fields
+            name for name in NUMERIC_SCENE_FIELD_NAMES if name not in self.measure.solved_fields
         )
 
     @property
@@ -269,7 +269,7 @@ class Elasticities(Measure):
         accuracy = integrator.accuracy
         most = min(accuracy.budget, _MAX_EVALUATION_RATIO * (outcome.rhs_evaluations or 1))
         limited = integrator.with_accuracy(replace(accuracy, budget=most))
-        step = min(_MAX_LOG_PARAMETER_STEP, (0.5 * here.error) ** (1.0 / 3.0))
+        step = min(_MAX_LOG_PARAMETER_STEP, (0.5 * here.log_value_error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
         lacking, stated = [], scene.as_dict()
         for place, name in enumerate(self.parameters):
@@ -427,15 +427,18 @@ def _compute_central_difference(
     """
     far_below, below, above, far_above = neighbouring_values
     if far_below and below and above and far_above:
-        near = (above.value - below.value) / (2.0 * log_step)
-        far = (far_above.value - far_below.value) / (4.0 * log_step)
-        of_levels = (above.error + below.error) / 1.5 + (far_above.error + far_below.error) / 12.0
+        near = (above.log_value - below.log_value) / (2.0 * log_step)
+        far = (far_above.log_value - far_below.log_value) / (4.0 * log_step)
+        of_levels = (above.log_value_error + below.log_value_error) / 1.5 + (
+            far_above.log_value_error + far_below.log_value_error
+        ) / 12.0
         of_levels /= log_step
         correction = (near - far) / 3.0
         levels = far_below, below, central_value, above, far_above
         fourth = abs(
             sum(
-                w * level.value for w, level in zip(_FOURTH_DIFFERENCE_WEIGHTS, levels, strict=True)
+                w * level.log_value
+                for w, level in zip(_FOURTH_DIFFERENCE_WEIGHTS, levels, strict=True)
             )
         )
         # The bound assumes that the fifth derivative is at most the fourth derivative divided by
@@ -445,15 +448,15 @@ def _compute_central_difference(
         )
         return near + correction, left + of_levels, of_levels
     if below and above:
-        slope = (above.value - below.value) / (2.0 * log_step)
-        bend = abs(above.value - 2.0 * central_value.value + below.value) / log_step
-        of_levels = (above.error + below.error) / (2.0 * log_step)
+        slope = (above.log_value - below.log_value) / (2.0 * log_step)
+        bend = abs(above.log_value - 2.0 * central_value.log_value + below.log_value) / log_step
+        of_levels = (above.log_value_error + below.log_value_error) / (2.0 * log_step)
         return slope, max(log_step**2, bend) + of_levels, of_levels
     for beside, sign in ((below, -1.0), (above, 1.0)):
         if beside:
-            slope = sign * (beside.value - central_value.value) / log_step
+            slope = sign * (beside.log_value - central_value.log_value) / log_step
             # The curvature is unknown. The estimate assumes twice the curvature of a logarithm
             # with this slope.
-            of_levels = (beside.error + central_value.error) / log_step
+            of_levels = (beside.log_value_error + central_value.log_value_error) / log_step
             return slope, log_step * max(1.0, slope**2) + of_levels, of_levels
     return math.nan, math.nan, math.nan

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_members
+from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_overrides
 from rsfstudy.error_boundary import ConstructorKeywordCheckMixin, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import _declaration_checks
@@ -30,7 +30,7 @@ from rsfstudy.motion import (
     Integrator,
     MotionStopped,
     WorkMeter,
-    accept_former_accuracy_and_meter,
+    accept_deprecated_accuracy_and_meter,
 )
 from rsfstudy.quantities import Output, Quantity, is_valid_variable_name
 from rsfstudy.slider import Scene, SceneFields, cached_attribute
@@ -147,8 +147,8 @@ class Measure(ConstructorKeywordCheckMixin):
     def __init_subclass__(cls) -> None:
         """Adopt former names of members that the subclass defines."""
         super().__init_subclass__()
-        add_new_names_for_former_members(cls)
-        accept_former_accuracy_and_meter(cls)
+        add_new_names_for_former_overrides(cls)
+        accept_deprecated_accuracy_and_meter(cls)
 
     @property
     def primary_output(self) -> str:
@@ -204,13 +204,16 @@ class Measure(ConstructorKeywordCheckMixin):
         return ()
 
     @property
-    def code_classes(self) -> tuple[type[Measure], ...]:
+    def result_determining_classes(self) -> tuple[type[Measure], ...]:
         """Classes whose code determines the results of the measure.
 
         The tuple contains the class of this measure and the classes of all measures in its fields.
         """
         held = (getattr(self, f.name) for f in fields(self))
-        return (type(self), *(c for m in held if isinstance(m, Measure) for c in m.code_classes))
+        return (
+            type(self),
+            *(c for m in held if isinstance(m, Measure) for c in m.result_determining_classes),
+        )
 
     @property
     def typical_work(self) -> int:
@@ -386,7 +389,7 @@ class Measure(ConstructorKeywordCheckMixin):
             return replace(outcome, message=outcome.message + meter.larger_budget_advice)
         return outcome
 
-    @accept_former_accuracy_and_meter
+    @accept_deprecated_accuracy_and_meter
     def run_nested(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the results for use in another measure.
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         rise,
     )
     from rsfstudy.motion.former_arguments import (
-        accept_former_accuracy_and_meter,
+        accept_deprecated_accuracy_and_meter,
     )
     from rsfstudy.motion.integrator import Integrator
     from rsfstudy.motion.motion_driver import MotionDriver
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     )
     from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
     from rsfstudy.motion.recording import (
-        Recording,
+        MotionRecorder,
     )
     from rsfstudy.motion.root_finding import build_root_finder
     from rsfstudy.motion.work_meter import (
@@ -92,9 +92,9 @@ __all__ = [
     "Integrator",
     "MotionDriver",
     "MotionStopped",
-    "Recording",
+    "MotionRecorder",
     "WorkMeter",
-    "accept_former_accuracy_and_meter",
+    "accept_deprecated_accuracy_and_meter",
     "approach_to_steady_state",
     "build_root_finder",
     "estimate_error",

@@ -23,7 +23,7 @@ MAX_EVALUATION_BUDGET = 10**15
 #: Upper limit of ``rtol`` in the formulas for the slow-manifold thresholds. The slow-manifold
 #: approximation, a series in the inertia weight, changes ln V by at most 0.08. A motion would never
 #: reach a larger threshold of this change.
-_LARGEST_RTOL_IN_REGIME_THRESHOLDS = 2e-5
+_MAX_RTOL_FOR_SWITCH_THRESHOLDS = 2e-5
 #: Maximum ratio of an error estimate to ``rtol``. If this ratio is exceeded, the difference between
 #: two runs is not a reliable error estimate.
 MAX_RELIABLE_ERROR_OVER_RTOL = 100.0
@@ -170,12 +170,10 @@ class Accuracy:
         In random scenes, the error of the stress drop is up to :math:`0.4 W^3`. The test suite
         measures the factor 1.6.
         """
-        return math.cbrt(
-            0.75 * min(self.rtol, _LARGEST_RTOL_IN_REGIME_THRESHOLDS) * self.refinement
-        )
+        return math.cbrt(0.75 * min(self.rtol, _MAX_RTOL_FOR_SWITCH_THRESHOLDS) * self.refinement)
 
     @property
-    def max_log_rate_change_by_inertia(self) -> float:
+    def max_log_slip_rate_change_by_inertia(self) -> float:
         """Maximum change in ln V due to inertia on the slow manifold.
 
         If friction weakens strongly with slip, a motion exceeds this limit before it exceeds the
@@ -183,9 +181,7 @@ class Accuracy:
         the error of a limit cycle is up to :math:`0.07 d^3` in random scenes, and :math:`0.0014
         d^3` for the slider of the published study. The test suite measures both coefficients.
         """
-        return math.cbrt(
-            15.0 * min(self.rtol, _LARGEST_RTOL_IN_REGIME_THRESHOLDS) * self.refinement
-        )
+        return math.cbrt(15.0 * min(self.rtol, _MAX_RTOL_FOR_SWITCH_THRESHOLDS) * self.refinement)
 
     @property
     def max_slip_in_return_to_slow_manifold(self) -> float:

@@ -118,7 +118,7 @@ MOTION_STATE_FIELDS_SET_BY_CALLER = (MOTION_STATE_DTYPE.names or ())[:11]
 SLOW_REGIME, FAST_REGIME = 0, 1
 #: Number of functions in each row of the function table. The functions are in the order of
 #: ``in_place_functions.InPlaceFunctions``.
-FUNCTION_COUNT_PER_REGIME = 4
+FUNCTION_TABLE_COLUMN_COUNT = 4
 
 #: Columns of the table of event specifications.
 EVENT_SPECIFICATION_COLUMNS = (

@@ -41,7 +41,7 @@ def split_segments_at_stress_jumps(
     """
     if only_last_segment:
         return ((scene.segment_scene(-1), SINGLE_ENDLESS_SEGMENT_TABLE),)
-    return scene.continuous_segments
+    return scene.segment_sequences_without_jumps
 
 
 def find_segments_left_to_integrate(
@@ -66,7 +66,7 @@ def find_segments_left_to_integrate(
         Point at which the motion continues.
     """
     first, point, left = 0, last_event.point, []
-    for acting, table in scene.continuous_segments:
+    for acting, table in scene.segment_sequences_without_jumps:
         number = int(np.searchsorted(table[:, SEGMENT_START], last_event.time, side="right")) - 1
         if number > 0:
             acting = scene.segment_scene(first + number)
@@ -142,7 +142,7 @@ def prepare_segment_with_noise(
 
 
 def iterate_segment_start_events(
-    event: Event,
+    segment_entry_event: Event,
     point_and_parameters_before: tuple[MotionPoint, FloatTuple],
     segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
@@ -169,15 +169,18 @@ def iterate_segment_start_events(
     Event
         Events at the start of the chain.
     """
-    yield event._replace(kind=EventKind.SEGMENT_START)
+    yield segment_entry_event._replace(kind=EventKind.SEGMENT_START)
     for spec, point in find_events_at_jump(
-        *point_and_parameters_before, event.point, segment_scene.parameter_values, event_specs
+        *point_and_parameters_before,
+        segment_entry_event.point,
+        segment_scene.parameter_values,
+        event_specs,
     ):
         # The slip of the start event is valid for both points, because slip never jumps.
-        yield event._replace(kind=spec.kind, specification=spec, point=point)
+        yield segment_entry_event._replace(kind=spec.kind, specification=spec, point=point)
 
 
-def select_possible_event_specs(
+def select_event_specs_that_can_occur(
     scene: Scene,
     first_segment_scene: Scene,
     event_specs: Sequence[EventSpecification],

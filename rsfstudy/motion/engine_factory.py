@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 
-def check_engine_is_usable(name: str) -> None:
+def check_engine_is_usable(engine_name: str) -> None:
     """Raise InvalidValue if an engine is unknown or not installed.
 
     Parameters
@@ -35,9 +35,9 @@ def check_engine_is_usable(name: str) -> None:
     InvalidValue
         If the engine is unknown, or if it is the compiled engine and Numba is not installed.
     """
-    if name not in ENGINE_NAMES and not find_user_stepper(name):
-        raise build_unknown_engine_error(name)
-    if name == COMPILED:
+    if engine_name not in ENGINE_NAMES and not find_user_stepper(engine_name):
+        raise build_unknown_engine_error(engine_name)
+    if engine_name == COMPILED:
         import_compiled_engine()
 
 

@@ -148,7 +148,7 @@ class CompilationLog:
 
     compiled_program_count: int = 0
     total_compilation_seconds: float = 0.0
-    create_compilation_context: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
+    compilation_context_factory: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
 
 
 compilation_log = CompilationLog()

@@ -29,7 +29,7 @@ _REMEDY_FOR_FORMER_ARGUMENTS = (
 )
 
 
-def accept_former_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
+def accept_deprecated_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
     """Let a function with an ``integrator`` accept the deprecated arguments.
 
     Parameters
@@ -118,7 +118,7 @@ def _adapt_former_compute_method(measure_class: type) -> None:
     if not inspect.isfunction(compute):
         return
     if not _takes_accuracy_and_meter(compute):
-        accept_former_accuracy_and_meter(compute)
+        accept_deprecated_accuracy_and_meter(compute)
         return
     text = (
         f"{measure_class.__name__}.compute takes scene, accuracy and meter. Write "

@@ -39,7 +39,7 @@ class InPlaceFunctions(NamedTuple):
     """
 
     fill_rates: NumericFunction
-    fill_point: NumericFunction
+    fill_motion_point: NumericFunction
     attempt_step: NumericFunction
     fill_force_balance: NumericFunction | None
 
@@ -76,7 +76,7 @@ def build_in_place_functions(equations: EquationsOfMotion) -> InPlaceFunctions:
 @cache
 def _build_in_place_functions_cached(
     rate_function: NumericFunction,
-    point_function: NumericFunction,
+    motion_point_function: NumericFunction,
     force_balance_function: NumericFunction | None,
     unknown_count: int,
     state_count: int,
@@ -89,7 +89,9 @@ def _build_in_place_functions_cached(
     )
     return InPlaceFunctions(
         fill_rates=build_fill_rates_function(rate_function, of_unknowns, numbers, unknown_count),
-        fill_point=build_fill_point_function(point_function, of_unknowns, numbers, state_count),
+        fill_motion_point=build_fill_motion_point_function(
+            motion_point_function, of_unknowns, numbers, state_count
+        ),
         attempt_step=unrolled_step.build_step_attempt_function(
             rate_function, unknown_count, numbers
         ),
@@ -135,8 +137,8 @@ def build_fill_rates_function(
     return fill_rates
 
 
-def build_fill_point_function(
-    point_function: NumericFunction,
+def build_fill_motion_point_function(
+    motion_point_function: NumericFunction,
     unpack_unknowns: NumericFunction,
     unpack_parameters: NumericFunction,
     state_count: int,
@@ -160,7 +162,9 @@ def build_fill_point_function(
 
     def fill_point(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[LOG_SLIP_RATE] = math.nan
-        point = point_function(unpack_unknowns(y), unpack_unknowns(rates), unpack_parameters(p))
+        point = motion_point_function(
+            unpack_unknowns(y), unpack_unknowns(rates), unpack_parameters(p)
+        )
         columns = point[:FIRST_STATE]
         for i in range(FIRST_STATE):
             result[i] = columns[i]

@@ -148,7 +148,7 @@ def _reset_loading_unknowns(scene: Scene, states: FloatTuple) -> FloatTuple:
     In the tuple of unknowns, the unknowns of the loading come after the states of the friction law
     and the temperature. Unknowns of the previous loading are removed.
     """
-    begun, parts = scene.stress_loading.initial_unknowns(scene), scene.parts
+    begun, parts = scene.stress_imposing_part.initial_unknowns(scene), scene.parts
     kept = parts.law.state_count + len(parts.temperature.unknowns)
     return (*states[:kept], *begun, *states[kept + len(begun) : scene.state_count])
 

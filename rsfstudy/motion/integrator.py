@@ -20,15 +20,18 @@ from rsfstudy.motion.continuous_segments import (
     find_segments_left_to_integrate,
     iterate_segment_start_events,
     prepare_segment_with_noise,
-    select_possible_event_specs,
+    select_event_specs_that_can_occur,
     split_segments_at_stress_jumps,
     truncate_segment_table_at_time,
 )
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import compute_initial_point, compute_point_after_loading_jump
 from rsfstudy.motion.motion_driver import MotionDriver, get_motion_driver
-from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.regime_switching import compute_regime_switch_thresholds, inertia_matters_at
+from rsfstudy.motion.recording import MotionRecorder
+from rsfstudy.motion.regime_switching import (
+    compute_regime_switch_thresholds,
+    is_inertia_significant_at,
+)
 from rsfstudy.motion.work_meter import MIN_LOCAL_TOLERANCE, WorkMeter
 from rsfstudy.parts import (
     LOADING,
@@ -256,7 +259,7 @@ class Integrator:
             True if the scene has inertia and the effect of inertia is too large for the slow
             manifold.
         """
-        return inertia_matters_at(scene, self.accuracy, point)
+        return is_inertia_significant_at(scene, self.accuracy, point)
 
     def follow_equations(
         self,
@@ -266,7 +269,7 @@ class Integrator:
         *,
         local_tolerance: float | None = None,
         backward: bool = False,
-        recording: Recording | None = None,
+        recording: MotionRecorder | None = None,
     ) -> Iterator[Event]:
         """Integrate a single system of equations, and yield the events.
 
@@ -309,7 +312,7 @@ class Integrator:
         *,
         start: MotionPoint | None = None,
         with_time: bool = False,
-        recording: Recording | None = None,
+        recording: MotionRecorder | None = None,
         until: float = math.inf,
         resume_from: Event | None = None,
     ) -> Iterator[Event]:
@@ -353,7 +356,7 @@ class Integrator:
         chains = split_segments_at_stress_jumps(scene, only_last_segment=start is not None)
         with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
         with_time = with_time or scene.parts.loading_noise.is_active
-        time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
+        time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_start_count
         if resume_from is not None:
             chains, start = find_segments_left_to_integrate(scene, resume_from)
             time, slip = resume_from.time, resume_from.slip
@@ -363,7 +366,7 @@ class Integrator:
             elif number:
                 start = compute_point_after_loading_jump(acting, start)
             is_last = number == len(chains) - 1
-            asked = select_possible_event_specs(
+            asked = select_event_specs_that_can_occur(
                 scene, acting, event_specs, includes_last_segment=is_last
             )
             table = truncate_segment_table_at_time(table, until)
@@ -385,12 +388,12 @@ class Integrator:
                 ),
                 switch_thresholds=compute_regime_switch_thresholds(acting, self.accuracy),
                 recording=recording,
-                kinks_and_reported_count=(table[1:], told),
+                later_segments_and_reported_count=(table[1:], told),
                 initial_imposed_stress=acting.parameter_values[LOADING + 2]
                 if acting.parts.loading.has_load_point_unknown
                 else None,
                 parameters=parameters,
-                further_kinks=further,
+                noise_segment_tables=further,
             )
             motion = drop_settling_events_if_unstable(scene, motion)
             if before is None and end == math.inf:  # The motion consists of a single chain.

@@ -29,7 +29,7 @@ from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
     SAMPLES_PER_STEP,
     SPRING_AND_FRICTIONAL_STRESS_COLUMNS,
-    Recording,
+    MotionRecorder,
 )
 from rsfstudy.motion.regime_switching import (
     SWITCH_THRESHOLDS_WITHOUT_INERTIA,
@@ -37,8 +37,8 @@ from rsfstudy.motion.regime_switching import (
     build_termination_error,
 )
 from rsfstudy.motion.work_meter import (
+    MAX_STEP_SCALING_REFERENCE_TOLERANCE,
     MIN_LOCAL_TOLERANCE,
-    REFERENCE_TOLERANCE_OF_MAX_STEP_LENGTH,
     MotionStopped,
     WorkMeter,
 )
@@ -53,14 +53,14 @@ _make_named_tuple_without_checks = tuple.__new__
 _STEP_TOO_SHORT_MESSAGE = (
     "the required step size is smaller than the spacing of floating-point numbers"
 )
-_EMPTY_TABLES_WITHOUT_RECORDING = (
+_MODE_AND_TABLES_WITHOUT_RECORDING = (
     array_layout.RECORD_NEVER,
     np.empty(0),
     np.empty((0, FIRST_STATE_COLUMN)),
 )
 #: Index of the segment table in the arguments of the loop that follow the motion state.
-_LOOP_ARGUMENT_INDEX_OF_KINKS = 5
-_EMPTY_KINK_TABLE_AND_ZERO_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
+_ARGUMENT_INDEX_OF_LATER_SEGMENTS = 5
+_NO_LATER_SEGMENTS_AND_ZERO_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
 class MotionDriver:
@@ -110,7 +110,7 @@ class MotionDriver:
             self._backend.build_function_table(self._equations),
         )
         self._p = self._backend.convert_parameters_for_motion_loop(slow_equations.parameters)
-        self._regimes = [system.regime for system in self._equations]
+        self._regimes = [system.regime_name for system in self._equations]
         fields |= {
             "pending_start": array_layout.START_CODE,
             "clock_is_path_length": not slow_equations.is_rigid,
@@ -134,10 +134,12 @@ class MotionDriver:
         parameters: FloatTuple | None = None,
         switch_thresholds: RegimeSwitchThresholds = SWITCH_THRESHOLDS_WITHOUT_INERTIA,
         evaluation_budget: float = math.inf,
-        recording: Recording | None = None,
-        kinks_and_reported_count: tuple[np.ndarray, int] = _EMPTY_KINK_TABLE_AND_ZERO_COUNT,
+        recording: MotionRecorder | None = None,
+        later_segments_and_reported_count: tuple[
+            np.ndarray, int
+        ] = _NO_LATER_SEGMENTS_AND_ZERO_COUNT,
         initial_imposed_stress: float | None = None,
-        further_kinks: Iterator[np.ndarray] | None = None,
+        noise_segment_tables: Iterator[np.ndarray] | None = None,
     ) -> Iterator[Event]:
         """Yield the events of a motion in the order of their occurrence.
 
@@ -191,7 +193,7 @@ class MotionDriver:
         """
         machine, states, numbers = self._backend, self._states, self._p
         systems: Iterable[EquationsOfMotion] = self._equations
-        before, turns = numbers, len(kinks_and_reported_count[0])
+        before, turns = numbers, len(later_segments_and_reported_count[0])
         if isinstance(start_point_or_unknowns, MotionPoint):
             start_point_or_unknowns = (
                 start_point_or_unknowns
@@ -227,10 +229,10 @@ class MotionDriver:
                 *(*duration_start_time_and_slip, stress, tolerance),
                 # The step limit depends on the tolerance. Otherwise, two runs with different
                 # tolerances could share an error, and their difference would not reveal the error.
-                (tolerance / REFERENCE_TOLERANCE_OF_MAX_STEP_LENGTH) ** 0.125,
+                (tolerance / MAX_STEP_SCALING_REFERENCE_TOLERANCE) ** 0.125,
                 -1.0 if backward else 1.0,
                 int(min(evaluation_budget, work_meter.budget - work_meter.evaluations)),
-                *(records, turns, kinks_and_reported_count[1]),
+                *(records, turns, later_segments_and_reported_count[1]),
             ),
         )
         asked, meanings = pack_event_specifications_into_table(tuple(event_specs))
@@ -242,7 +244,7 @@ class MotionDriver:
             *machine.convert_arrays_for_motion_loop(y, last, block),
             (*self._scales_and_functions, tuple(switch_thresholds), numbers, before),
             *machine.convert_arrays_for_motion_loop(
-                asked.copy(), kinks_and_reported_count[0], samples, events, rows
+                asked.copy(), later_segments_and_reported_count[0], samples, events, rows
             ),
             stepper,
         ]
@@ -250,7 +252,7 @@ class MotionDriver:
         run, end, known = machine.get_motion_loop_function(), array_layout.PAUSED, (0, 0, 0, 0)
         while end == array_layout.PAUSED:
             end = run(state.motion_state_array, *arguments)
-            slow, fast, steps, happened, recorded, jacobians = state.get_work_and_row_counts()
+            slow, fast, steps, happened, recorded, jacobians = state.get_work_and_table_row_counts()
             known, settled = (slow, fast, steps, jacobians), known
             others = work_meter.charge_work_since_last_call(regimes, settled, known)
             if recording is not None and recorded:
@@ -273,16 +275,19 @@ class MotionDriver:
                     Event, (kind, spec, time, slip, point, name, work, clock)
                 )
             work_meter.check_budget()
-            if further_kinks is not None and state.get_state_field("kinks_ahead") == 0.0:
-                for table in islice(further_kinks, 1):
-                    arguments[_LOOP_ARGUMENT_INDEX_OF_KINKS] = (
+            if (
+                noise_segment_tables is not None
+                and state.get_motion_state_field("kinks_ahead") == 0.0
+            ):
+                for table in islice(noise_segment_tables, 1):
+                    arguments[_ARGUMENT_INDEX_OF_LATER_SEGMENTS] = (
                         machine.convert_arrays_for_motion_loop(table)[0]
                     )
-                    state.set_remaining_kink_count(len(table))
+                    state.set_remaining_loading_kink_count(len(table))
         if end != array_layout.MOTION_ENDED:
             overflow = ""
             if end in (array_layout.NO_STEP_POSSIBLE, array_layout.INVALID_STEP):
-                system = self._equations[int(state.get_state_field("regime"))]
+                system = self._equations[int(state.get_motion_state_field("regime"))]
                 unknowns = tuple(y[: len(system.unknown_names)].tolist())
                 overflow = describe_overflow(system.rate_function, unknowns, tuple(numbers))
             raise _build_motion_stopped_error(end, state, regimes, stepper, overflow)
@@ -298,7 +303,7 @@ def _shift_stresses_of_point(point: MotionPoint, stress_change: float) -> Motion
 
 @cached_per_scene
 def get_motion_driver(
-    scene: Scene, engine: str, methods: tuple[tuple[str, str], ...], *, with_time: bool
+    scene: Scene, engine: str, methods: tuple[tuple[str, str], ...], *, include_time_equation: bool
 ) -> MotionDriver:
     """Return the driver of the motions of a scene.
 
@@ -319,8 +324,8 @@ def get_motion_driver(
         Driver of the scene. The driver is cached in the scene.
     """
     return MotionDriver(
-        scene.equations_between_ruptures(with_time=with_time),
-        scene.equations_in_rupture(with_time=with_time) if scene.has_mass else None,
+        scene.equations_between_ruptures(with_time=include_time_equation),
+        scene.equations_in_rupture(with_time=include_time_equation) if scene.has_mass else None,
         engine=engine,
         methods=methods,
         unknowns_behind_fluid=len(scene.parts.fluid.unknowns)
@@ -332,16 +337,16 @@ def get_motion_driver(
         else 0,
         starts_at_point=1,
         may_terminate=1,
-        has_clock=with_time,
+        has_clock=include_time_equation,
     )
 
 
 def _prepare_recording_tables(
-    recording: Recording | None, equations: EquationsOfMotion, state_count: int
+    recording: MotionRecorder | None, equations: EquationsOfMotion, state_count: int
 ) -> tuple[int, np.ndarray, np.ndarray]:
     """Return the recording mode, requested samples and output table."""
     if recording is None:
-        return _EMPTY_TABLES_WITHOUT_RECORDING
+        return _MODE_AND_TABLES_WITHOUT_RECORDING
     if recording.sample_times is None:
         return (
             array_layout.RECORD_WITHIN_STEPS,

@@ -110,7 +110,7 @@ def advance_motion(
     workspace_block,
     loop_constants,
     event_specs,
-    kinks,
+    later_segments,
     requested_samples,
     event_table,
     recording_table,
@@ -195,7 +195,7 @@ def advance_motion(
             set_initial_unknowns_of_regime(motion, y, last_point)
         elif end == SEGMENT_ENDED:
             regime, end = motion.regime, REGIME_ENDED
-            start_next_segment(motion, workspace, last_point, kinks, recording_table)
+            start_next_segment(motion, workspace, last_point, later_segments, recording_table)
             enter_initial_regime(motion, y, last_point, functions, workspace_block, limits, p)
             if motion.regime != regime:
                 motion.next_step_length = 0.0

@@ -95,7 +95,7 @@ def estimate_neglected_inertia_error(
     if not used.size:
         return _ERROR_SAFETY_FACTOR * jumps
     left = np.maximum.accumulate(
-        _bound_log_rate_changes_by_residuals(scene, recorded_rows[used], norms[1:][used])
+        _compute_log_slip_rate_change_bounds(scene, recorded_rows[used], norms[1:][used])
     )
     # All other rows are assigned the estimate of the next evaluated row, because residuals may rise
     # steeply.
@@ -105,7 +105,7 @@ def estimate_neglected_inertia_error(
     return _ERROR_SAFETY_FACTOR * (jumps + left[number])
 
 
-def _bound_log_rate_changes_by_residuals(
+def _compute_log_slip_rate_change_bounds(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> np.ndarray:
     """Compute an upper bound on the change in ln V due to residuals.
@@ -173,7 +173,7 @@ def _compute_force_balance_residual(
 
 def _iterate_segment_scenes(scene: Scene) -> Iterator[tuple[float, Scene, FloatTuple]]:
     """Yield the start time, scene and parameters of each loading segment."""
-    for acting, table in scene.continuous_segments:
+    for acting, table in scene.segment_sequences_without_jumps:
         for n, row in enumerate(table.tolist()):
             p = list(acting.parameter_values)
             if n > 0:

@@ -81,7 +81,7 @@ class PythonBackend:
             Functions that fill arrays, one row per regime. Both rows of the table contain the force
             balance function of the slow manifold.
         """
-        rows = np.zeros((2, array_layout.FUNCTION_COUNT_PER_REGIME), dtype=object)
+        rows = np.zeros((2, array_layout.FUNCTION_TABLE_COLUMN_COUNT), dtype=object)
         for row, system in zip(rows, equations_by_regime, strict=False):
             row[:] = build_in_place_functions(system)
         rows[array_layout.FAST_REGIME, -1] = rows[array_layout.SLOW_REGIME, -1]
@@ -129,7 +129,7 @@ class PythonBackend:
         return advance_motion
 
 
-@partial(add_former_member_names, writable=True)
+@partial(add_former_member_names, allow_assignment=True)
 class PythonMotionState(SimpleNamespace):
     """State of a motion as a Python object with the fields of ``MOTION_STATE_DTYPE``."""
 
@@ -138,7 +138,7 @@ class PythonMotionState(SimpleNamespace):
         """Argument ``motion_state_array`` of the event loop."""
         return [self]
 
-    def get_work_and_row_counts(self) -> tuple[int, ...]:
+    def get_work_and_table_row_counts(self) -> tuple[int, ...]:
         """Return the counters of evaluations, steps and table rows.
 
         Returns
@@ -152,7 +152,7 @@ class PythonMotionState(SimpleNamespace):
             *(self.event_rows, self.recorded_rows, self.jacobians),
         )
 
-    def set_remaining_kink_count(self, count: int) -> None:
+    def set_remaining_loading_kink_count(self, count: int) -> None:
         """Set the number of remaining kinks.
 
         Parameters
@@ -162,7 +162,7 @@ class PythonMotionState(SimpleNamespace):
         """
         self.kinks_ahead = count
 
-    def get_state_field(self, field_name: str) -> float:
+    def get_motion_state_field(self, field_name: str) -> float:
         """Return the value of a field of the motion state.
 
         Parameters

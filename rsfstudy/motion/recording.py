@@ -47,7 +47,7 @@ SAMPLES_PER_STEP = 6
 
 
 @dataclass
-class Recording:
+class MotionRecorder:
     """Recorder of a motion.
 
     Parameters
@@ -72,7 +72,7 @@ class Recording:
     regime_names: list[str] = field(default_factory=list)
     sample_times: np.ndarray | None = None
     _row_blocks: list[np.ndarray] = field(default_factory=list)
-    _block_count_with_capped_times: int = 0
+    _time_capped_block_count: int = 0
 
     def get_or_add_regime_index(self, regime_name: str) -> int:
         """Return the index of a regime, and add new regimes to the list.
@@ -131,11 +131,11 @@ class Recording:
         """
         if self.sample_times is not None:
             return
-        for rows in self._row_blocks[self._block_count_with_capped_times :]:
+        for rows in self._row_blocks[self._time_capped_block_count :]:
             np.minimum(rows[:, 0], end_time, out=rows[:, 0])
-        if self._block_count_with_capped_times < len(self._row_blocks):
+        if self._time_capped_block_count < len(self._row_blocks):
             self._row_blocks[-1][-1:, 0] = end_time
-        self._block_count_with_capped_times = len(self._row_blocks)
+        self._time_capped_block_count = len(self._row_blocks)
 
     def as_table(self, scene: Scene, end_event: Event | None = None) -> np.ndarray:
         """Return the recorded motion as a table.
@@ -422,7 +422,7 @@ def resample_along_path(  # type: ignore[no-untyped-def]
     interpolate_at_fractional_rows(columns, row_positions, result)
 
 
-def move_nearest_row_position_to(row_positions: Any, row_position: float) -> None:
+def move_nearest_row_position_to(row_positions: Any, target_position: float) -> None:
     """Replace the nearest interior row position by a given row position.
 
     Parameters
@@ -434,11 +434,11 @@ def move_nearest_row_position_to(row_positions: Any, row_position: float) -> Non
     """
     nearest = 1
     while nearest < len(row_positions) - 2 and abs(
-        row_positions[nearest + 1] - row_position
-    ) <= abs(row_positions[nearest] - row_position):
+        row_positions[nearest + 1] - target_position
+    ) <= abs(row_positions[nearest] - target_position):
         nearest += 1
     if nearest < len(row_positions) - 1:
-        row_positions[nearest] = row_position
+        row_positions[nearest] = target_position
 
 
 def find_fractional_row_of_extremum(

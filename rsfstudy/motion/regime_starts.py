@@ -8,7 +8,7 @@ from rsfstudy.motion.array_layout import (
     FAST_REGIME,
     FIRST_STATE,
     FRICTIONAL_STRESS,
-    FUNCTION_COUNT_PER_REGIME,
+    FUNCTION_TABLE_COLUMN_COUNT,
     KINK_CODE,
     LOG_SLIP_RATE,
     RECORD_WITHIN_STEPS,
@@ -36,10 +36,10 @@ from rsfstudy.parts import (
 #: Change in ln V_0 between two loading segments above which the stepper selects a new initial step
 #: size. The path length depends on V + V_0, so the step size of the previous segment would be
 #: rejected several times.
-MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE = 3.0
+LOG_VELOCITY_JUMP_RESETTING_STEP_SIZE = 3.0
 
 
-def start_next_segment(motion, workspace, last_point, kinks, recording_table):
+def start_next_segment(motion, workspace, last_point, later_segments, recording_table):
     """Replace the loading parameters by the parameters of the next segment.
 
     Parameters
@@ -56,7 +56,7 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
         Output table of recorded samples.
     """
     n, p, relief = (
-        len(kinks) - motion.kinks_ahead,
+        len(later_segments) - motion.kinks_ahead,
         workspace.parameters,
         FIRST_STATE + motion.states - 1 - motion.unknowns_behind_fluid,
     )
@@ -66,10 +66,10 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
     )
     motion.spring_stress, motion.time, motion.regime_start_time = (
         last_point[SPRING_STRESS],
-        kinks[n, SEGMENT_START],
+        later_segments[n, SEGMENT_START],
         0.0,
     )
-    motion.end_time = kinks[n, SEGMENT_END] - kinks[n, SEGMENT_START]
+    motion.end_time = later_segments[n, SEGMENT_END] - later_segments[n, SEGMENT_START]
     motion.pending_start, motion.kinks_ahead = KINK_CODE, motion.kinks_ahead - 1
     # The located end of a segment has a rounding error.
     if motion.recording_mode == RECORD_WITHIN_STEPS:
@@ -77,21 +77,21 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
     copy_values(p, workspace.parameters_before, LAW)
     # The step size remains valid unless the load point velocity changes strongly.
     if (
-        not abs(kinks[n, SEGMENT_LOG_VELOCITY] - p[LOG_LOAD_VELOCITY])
-        < MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE
+        not abs(later_segments[n, SEGMENT_LOG_VELOCITY] - p[LOG_LOAD_VELOCITY])
+        < LOG_VELOCITY_JUMP_RESETTING_STEP_SIZE
     ):
         motion.next_step_length = 0.0
     p[LOAD_VELOCITY], p[LOG_LOAD_VELOCITY] = (
-        kinks[n, SEGMENT_VELOCITY],
-        kinks[n, SEGMENT_LOG_VELOCITY],
+        later_segments[n, SEGMENT_VELOCITY],
+        later_segments[n, SEGMENT_LOG_VELOCITY],
     )
-    if not math.isnan(kinks[n, SEGMENT_STRESS_RATE]):
-        p[BOUNDARY_PRESSURE_RATE if motion.unknowns_behind_fluid else LOADING] = kinks[
+    if not math.isnan(later_segments[n, SEGMENT_STRESS_RATE]):
+        p[BOUNDARY_PRESSURE_RATE if motion.unknowns_behind_fluid else LOADING] = later_segments[
             n, SEGMENT_STRESS_RATE
         ]
-        last_point[relief] = kinks[n, SEGMENT_STRESS_FALL]
+        last_point[relief] = later_segments[n, SEGMENT_STRESS_FALL]
     if motion.noise_rate_index > 0:
-        p[motion.noise_rate_index] = kinks[n, SEGMENT_NOISE_RATE]
+        p[motion.noise_rate_index] = later_segments[n, SEGMENT_NOISE_RATE]
 
 
 def enter_initial_regime(
@@ -120,7 +120,7 @@ def enter_initial_regime(
     set_initial_unknowns_of_regime(motion, y, last_point)
     if motion.has_mass:
         evaluate_function_into_array(
-            functions[SLOW_REGIME, FUNCTION_COUNT_PER_REGIME - 1],
+            functions[SLOW_REGIME, FUNCTION_TABLE_COLUMN_COUNT - 1],
             y,
             y,
             parameters,

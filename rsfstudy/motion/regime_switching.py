@@ -28,12 +28,12 @@ from rsfstudy.status import Status
 #: the second limit.
 MIN_NORMAL_STRESS, MAX_NORMAL_STRESS = 1e-9, 1e6
 #: Lower bound that is applied to the normal stress, in sigma_*, before its logarithm is computed.
-MIN_POSITIVE_NORMAL_STRESS = 1e-300
+NORMAL_STRESS_FLOOR_FOR_LOGARITHM = 1e-300
 #: Upper limit of ln(V/V_*) without inertia. The slip rate is unbounded above 10^120 V_*.
 MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
 #: Limits of ln(V/V_*). They are constants of this module because compiled functions read them.
-LARGEST_LOG_SLIP_RATE = Scene.LOG_SLIP_RATE_UPPER_LIMIT
-STOPPED_LOG_SLIP_RATE = Scene.LOG_SLIP_RATE_OF_STOPPED_SLIP
+LOG_SLIP_RATE_UPPER_LIMIT = Scene.LOG_SLIP_RATE_UPPER_LIMIT
+LOG_SLIP_RATE_OF_STOPPED_SLIP = Scene.LOG_SLIP_RATE_OF_STOPPED_SLIP
 #: Codes for the termination status of a motion.
 CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_RATE_UNBOUNDED = (
     range(5)
@@ -60,7 +60,7 @@ class RegimeSwitchThresholds(NamedTuple):
     """
 
     max_slip_rate_norm: float
-    max_log_rate_change_by_inertia: float
+    max_log_slip_rate_change_by_inertia: float
     max_slip_in_return_to_slow_manifold: float
     stiffness_over_a: float
     a: float
@@ -95,7 +95,7 @@ def compute_regime_switch_thresholds(scene: Scene, accuracy: Accuracy) -> Regime
     softness = scene.stiffness / scene.a
     return RegimeSwitchThresholds(
         math.sqrt(accuracy.max_inertia_weight_on_slow_manifold / softness),
-        accuracy.max_log_rate_change_by_inertia,
+        accuracy.max_log_slip_rate_change_by_inertia,
         accuracy.max_slip_in_return_to_slow_manifold,
         softness,
         scene.a,
@@ -120,7 +120,7 @@ def compute_slip_rate_norm(
     float
         Slip rate norm :math:`w = V T/(2 \pi D_c)`.
     """
-    return switch_thresholds.inertial_time * math.exp(min(log_slip_rate, LARGEST_LOG_SLIP_RATE))
+    return switch_thresholds.inertial_time * math.exp(min(log_slip_rate, LOG_SLIP_RATE_UPPER_LIMIT))
 
 
 def compute_inertia_effect_over_limit(
@@ -147,7 +147,7 @@ def compute_inertia_effect_over_limit(
     correction = (
         abs(inertial_stress)
         / switch_thresholds.a
-        / switch_thresholds.max_log_rate_change_by_inertia
+        / switch_thresholds.max_log_slip_rate_change_by_inertia
     )
     return max(
         compute_slip_rate_norm(log_slip_rate, switch_thresholds)
@@ -156,7 +156,7 @@ def compute_inertia_effect_over_limit(
     )
 
 
-def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> bool:
+def is_inertia_significant_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> bool:
     """Return True if the slow manifold is not accurate enough at a point.
 
     Parameters
@@ -181,7 +181,7 @@ def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> 
     return compute_inertia_effect_over_limit(point.log_slip_rate, inertial_stress, given) >= 1.0
 
 
-def compute_slip_during_transition(
+def compute_slip_during_rate_change(
     initial_log_slip_rate: float,
     final_log_slip_rate: float,
     switch_thresholds: RegimeSwitchThresholds,
@@ -260,7 +260,9 @@ def can_start_on_slow_manifold(
     )
     return (
         slow
-        and compute_slip_during_transition(log_slip_rate, manifold_log_slip_rate, switch_thresholds)
+        and compute_slip_during_rate_change(
+            log_slip_rate, manifold_log_slip_rate, switch_thresholds
+        )
         <= switch_thresholds.max_slip_in_return_to_slow_manifold
     )
 
@@ -400,14 +402,14 @@ def find_termination_status(
         return NORMAL_STRESS_VANISHED
     if normal_stress >= MAX_NORMAL_STRESS:
         return NORMAL_STRESS_UNBOUNDED
-    if log_slip_rate <= STOPPED_LOG_SLIP_RATE and load_velocity == 0.0:
+    if log_slip_rate <= LOG_SLIP_RATE_OF_STOPPED_SLIP and load_velocity == 0.0:
         return SLIP_STOPPED
     if log_slip_rate >= MAX_LOG_SLIP_RATE_WITHOUT_INERTIA:
         return SLIP_RATE_UNBOUNDED
     return CONTINUES
 
 
-def compute_margin_to_termination(
+def compute_margin_to_motion_termination(
     log_slip_rate: float, normal_stress: float, load_velocity: float
 ) -> float:
     r"""Compute the margin between a motion and its nearest termination limit.
@@ -427,13 +429,15 @@ def compute_margin_to_termination(
         Smallest of the differences between ln V and its limits, and between the logarithm of normal
         stress and its limits. The margin is positive if the motion continues.
     """
-    stress = math.log(max(normal_stress, MIN_POSITIVE_NORMAL_STRESS))
+    stress = math.log(max(normal_stress, NORMAL_STRESS_FLOOR_FOR_LOGARITHM))
     left = min(
         stress - math.log(MIN_NORMAL_STRESS),
         math.log(MAX_NORMAL_STRESS) - stress,
         MAX_LOG_SLIP_RATE_WITHOUT_INERTIA - log_slip_rate,
     )
-    return min(left, log_slip_rate - STOPPED_LOG_SLIP_RATE) if load_velocity == 0.0 else left
+    return (
+        min(left, log_slip_rate - LOG_SLIP_RATE_OF_STOPPED_SLIP) if load_velocity == 0.0 else left
+    )
 
 
 def build_termination_error(termination_status: int, normal_stress: float) -> MotionStopped:

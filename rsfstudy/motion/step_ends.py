@@ -13,7 +13,7 @@ from rsfstudy.motion.array_layout import (
 from rsfstudy.motion.array_operations import evaluate_function_into_array
 from rsfstudy.motion.regime_switching import (
     CONTINUES,
-    compute_margin_to_termination,
+    compute_margin_to_motion_termination,
     find_termination_status,
     is_slip_slow_enough_for_slow_manifold,
     should_switch_back_to_slow_manifold,
@@ -62,12 +62,12 @@ def is_step_end_valid(motion, workspace):
     )
     if motion.termination == CONTINUES:
         return True
-    at_begin = compute_margin_to_termination(
+    at_begin = compute_margin_to_motion_termination(
         workspace.point_at_begin[LOG_SLIP_RATE],
         workspace.point_at_begin[NORMAL_STRESS_RATIO],
         velocity,
     )
-    at_end = compute_margin_to_termination(
+    at_end = compute_margin_to_motion_termination(
         columns[LOG_SLIP_RATE], columns[NORMAL_STRESS_RATIO], velocity
     )
     if at_begin <= 0.0:

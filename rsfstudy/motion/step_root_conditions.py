@@ -29,7 +29,7 @@ from rsfstudy.motion.array_layout import (
 from rsfstudy.motion.array_operations import advance_pointer_by_items
 from rsfstudy.motion.regime_switching import (
     compute_inertia_effect_over_limit,
-    compute_margin_to_termination,
+    compute_margin_to_motion_termination,
 )
 from rsfstudy.motion.root_finding import build_root_finder
 from rsfstudy.motion.step_integration import (
@@ -202,7 +202,7 @@ def evaluate_root_condition(independent_variable, condition_context):
     if what == SWITCH_CONDITION:
         return compute_excess_over_switch_threshold(motion, workspace, workspace.point_within)
     if what == TERMINATION_CONDITION:
-        return compute_margin_to_termination(
+        return compute_margin_to_motion_termination(
             workspace.point_within[LOG_SLIP_RATE],
             workspace.point_within[NORMAL_STRESS_RATIO],
             workspace.parameters[LOAD_VELOCITY],

@@ -23,7 +23,7 @@ from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.plots._style import estimate_text_capacity_in_characters
 from rsfstudy.plots._text import (
     convert_symbols_to_mathtext,
-    estimate_visible_length,
+    estimate_visible_character_count,
     find_quantity_symbol_or_name,
     format_number,
     format_quantity_axis_label,
@@ -40,19 +40,19 @@ from rsfstudy.vocabulary import find_coverage_content_type, find_quantity
 _MIN_RATIO_FOR_LOG_SCALE = 100.0
 #: If the ratio of the upper to the lower limit of a log axis is less than this value, the axis has
 #: additional tick labels between powers of ten.
-_MAX_LIMIT_RATIO_FOR_MINOR_TICK_LABELS = 50.0
+_MAX_AXIS_LIMIT_RATIO_FOR_MINOR_LABELS = 50.0
 #: Maximum number of tick labels along the y axis and along the x axis, if the tick labels are
 #: names.
 _MAX_POINT_NAMES_ALONG_Y, _MAX_POINT_NAMES_ALONG_X = 45, 30
 #: Maximum number of horizontal tick labels with names along x. If there are more names, the tick
 #: labels are vertical.
-_MAX_HORIZONTAL_TICK_NAMES_ALONG_X = 12
+_MAX_UNROTATED_X_TICK_LABELS = 12
 #: Height of the title and the labels below a panel, in characters.
-_HEIGHT_BELOW_PANEL_IN_CHARACTERS = 6
+_TITLE_AND_LABEL_HEIGHT_IN_CHARACTERS = 6
 #: Smallest font size of figures in points.
 MIN_FONT_SIZE = 6.0
 #: Templates of phrases that describe the points of some axes, for example in titles.
-_POINT_PHRASE_TEMPLATE_BY_AXIS = {
+_POINT_DESCRIPTION_TEMPLATE_BY_AXIS = {
     "law": "{} law",
     "normal_stress": "{} normal stress",
     "load": "load point {}",
@@ -329,7 +329,7 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
     if isinstance(value, str):
         if dimension == "law" and value in _DESCRIPTION_BY_LAW_NAME:
             return _DESCRIPTION_BY_LAW_NAME[value]
-        return _POINT_PHRASE_TEMPLATE_BY_AXIS.get(dimension, "{}").format(
+        return _POINT_DESCRIPTION_TEMPLATE_BY_AXIS.get(dimension, "{}").format(
             convert_symbols_to_mathtext(value)
         )
     if dimension == "stiffness_ratio":
@@ -365,12 +365,12 @@ def set_up_x_axis_for_dimension(axes: Axes, dataset: xr.Dataset, dimension: str)
         return np.asarray(points, dtype=float)
     names, width = [str(point) for point in points], max(8, 48 // points.size)
     longest = max(
-        estimate_visible_length(part)
+        estimate_visible_character_count(part)
         for name in names
         for part in wrap_text(convert_symbols_to_mathtext(name), width).split("\n")
     )
-    upright = points.size > _MAX_HORIZONTAL_TICK_NAMES_ALONG_X or longest > 1.4 * width
-    set_ticks_with_point_names(
+    upright = points.size > _MAX_UNROTATED_X_TICK_LABELS or longest > 1.4 * width
+    set_tick_labels_to_point_names(
         axes.xaxis, names, 40 if upright else width, _MAX_POINT_NAMES_ALONG_X
     )
     if upright:
@@ -397,7 +397,7 @@ def set_log_scale(axes: Axes, axis_name: str) -> None:
     if high < 3.0 * low:
         axis.set_major_locator(MaxNLocator(3))
         axis.set_major_formatter(FuncFormatter(lambda value, _place: format_number(value)))
-    elif high < _MAX_LIMIT_RATIO_FOR_MINOR_TICK_LABELS * low:
+    elif high < _MAX_AXIS_LIMIT_RATIO_FOR_MINOR_LABELS * low:
         between: tuple[float, ...] = (3.0,)
         if high < 10.0 * low:
             between = (2.0, 5.0) if axis_name == "x" else (2.0, 3.0, 4.0, 6.0, 8.0)
@@ -406,7 +406,7 @@ def set_log_scale(axes: Axes, axis_name: str) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def set_ticks_with_point_names(
+def set_tick_labels_to_point_names(
     axis: Axis,
     point_names: list[str],
     max_line_characters: int,
@@ -459,7 +459,7 @@ def label_rows(axes: Axes, names: list[str], width: int = 60) -> None:
     >>> [float(limit) for limit in axes.get_ylim()]
     [1.5, -0.5]
     """
-    set_ticks_with_point_names(axes.yaxis, names, width)
+    set_tick_labels_to_point_names(axes.yaxis, names, width)
     axes.set_ylim(len(names) - 0.5, -0.5)
 
 
@@ -520,7 +520,7 @@ def add_colour_bar_of_variable(
         Name of the variable.
     """
     bar = cast(Figure, axes.figure).colorbar(colour_scale, ax=axes, pad=0.02)
-    longest = estimate_text_capacity_in_characters(axes)[1] - _HEIGHT_BELOW_PANEL_IN_CHARACTERS
+    longest = estimate_text_capacity_in_characters(axes)[1] - _TITLE_AND_LABEL_HEIGHT_IN_CHARACTERS
     bar.set_label(format_axis_label(dataset, variable_name, min(34, longest)))
 
 

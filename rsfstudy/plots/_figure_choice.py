@@ -32,8 +32,8 @@ FIGURE_NAMES = (*_GENERIC_FIGURE_NAMES, _NAME_OF_FITS_FIGURE, *list_study_names(
 _MAX_POINTS_OF_REPEATED_AXES, _MAX_PANELS_AFTER_REPEATING = 4, 12
 
 
-def choose_figure(
-    dataset: xr.Dataset, user_figure: Any = None, variable: str | None = None
+def choose_figure_and_build_panels(
+    dataset: xr.Dataset, requested_figure: Any = None, variable: str | None = None
 ) -> tuple[Declared, xr.Dataset]:
     """Choose the figure that displays a dataset, and create all its panels.
 
@@ -60,35 +60,35 @@ def choose_figure(
         from rsfstudy.plots import corner_plots
 
         return corner_plots.posterior_figure(dataset)
-    if name == _NAME_OF_FITS_FIGURE and user_figure is variable is None:
+    if name == _NAME_OF_FITS_FIGURE and requested_figure is variable is None:
         return Declared(
             importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").build_panels_of_figure(
                 dataset
             )
         ), dataset
     if (
-        user_figure is None
+        requested_figure is None
         and study is None
         and name not in (*_GENERIC_FIGURE_NAMES, _NAME_OF_FITS_FIGURE)
     ):
         raise InvalidValue("plot", name, "is unknown", choices=FIGURE_NAMES)
     known = {str(dimension) for dimension in sizes}
-    if study is not None and user_figure in (None, study.plot):
-        user_figure, dataset = study.plot, _restore_single_point_dimensions(dataset, study)
-        if isinstance(user_figure, Declared) and not user_figure.allow_extra_dims:
+    if study is not None and requested_figure in (None, study.plot):
+        requested_figure, dataset = study.plot, _restore_single_point_dimensions(dataset, study)
+        if isinstance(requested_figure, Declared) and not requested_figure.allow_extra_dims:
             known = set(study.dimensions)
-    elif isinstance(user_figure, Declared):
-        known -= set(StoredDataset(dataset).declaration.overrides) - user_figure.dimensions
+    elif isinstance(requested_figure, Declared):
+        known -= set(StoredDataset(dataset).declaration.overrides) - requested_figure.dimensions
     varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
     further = sorted(varied - known)
     many = math.prod(sizes[dimension] for dimension in further) > _MAX_POINTS_OF_REPEATED_AXES
-    plain = variable is not None or user_figure is None or isinstance(user_figure, str)
-    if plain or many or DatasetUnits(dataset).differ_from_units_of_figures:
+    plain = variable is not None or requested_figure is None or isinstance(requested_figure, str)
+    if plain or many or DatasetUnits(dataset).has_units_other_than_display_units:
         return _build_generic_figure(dataset, variable), dataset
     drawing = (
-        user_figure
-        if isinstance(user_figure, Declared)
-        else Declared([getattr(user_figure, "draw", user_figure)])
+        requested_figure
+        if isinstance(requested_figure, Declared)
+        else Declared([getattr(requested_figure, "draw", requested_figure)])
     )
     dataset = dataset.squeeze(sorted(set(map(str, sizes)) - known - varied), drop=False)
     panels = _repeat_panels_for_facets_and_extra_axes(drawing, dataset, further)

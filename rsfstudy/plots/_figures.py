@@ -18,12 +18,12 @@ from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.formatting import format_count_with_noun, format_overrides
 from rsfstudy.plots import _panel
-from rsfstudy.plots._figure_choice import choose_figure
+from rsfstudy.plots._figure_choice import choose_figure_and_build_panels
 from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
 from rsfstudy.plots._size import (
     compute_figure_size_in_inches,
-    compute_max_header_line_length,
-    limit_panel_columns_to_width,
+    compute_max_header_line_characters,
+    limit_panel_column_count_to_width,
 )
 from rsfstudy.plots._style import (
     add_panel_letters,
@@ -141,10 +141,10 @@ def draw_figure(
         )
     dataset = DatasetUnits(dataset).convert_to_display_units()
     with style_context(style, width):
-        drawing, dataset = choose_figure(dataset, user_figure, variable)
+        drawing, dataset = choose_figure_and_build_panels(dataset, user_figure, variable)
         is_corner = isinstance(drawing, CornerFigure)
         columns = min(drawing.columns, len(drawing.panels))
-        columns = columns if is_corner else limit_panel_columns_to_width(columns)
+        columns = columns if is_corner else limit_panel_column_count_to_width(columns)
         figure, drawn = _create_empty_panels(drawing, dataset, columns)
         for axes, panel in zip(drawn, drawing.panels, strict=True):
             freeze_tick_label_size(axes)
@@ -159,7 +159,7 @@ def draw_figure(
             add_panel_letters(drawn)
         merge_common_legends(figure, drawn)
         if header:
-            _add_header(figure, dataset)
+            _add_header_with_notes(figure, dataset)
         rows = [[a for a in drawn if _find_row_index_of_panel(a) == n] for n in range(len(drawn))]
         increase_figure_height_for_legends(figure, list(filter(None, rows)))
         finalize_layout(figure)
@@ -196,12 +196,12 @@ def _find_row_index_of_panel(axes: Axes) -> int:
     return 0 if place is None else place.rowspan.start
 
 
-def _add_header(figure: Figure, dataset: xr.Dataset) -> None:
+def _add_header_with_notes(figure: Figure, dataset: xr.Dataset) -> None:
     """Add a header that lists overridden settings, and missing and failed cells."""
     overrides = StoredDataset(dataset).declaration.overrides
     missing, is_warning = _format_note_on_missing_cells(dataset)
     lines = (
-        [_format_note_on_overrides(dataset, compute_max_header_line_length(figure))]
+        [_format_note_on_overrides(dataset, compute_max_header_line_characters(figure))]
         if overrides
         else []
     )

@@ -16,7 +16,7 @@ from rsfstudy.errors import DataError
 from rsfstudy.fitting import Record
 from rsfstudy.plots._axes import set_log_scale
 from rsfstudy.plots._image_files import NotebookFigure
-from rsfstudy.plots._size import compute_figure_size_in_inches, limit_panel_columns_to_width
+from rsfstudy.plots._size import compute_figure_size_in_inches, limit_panel_column_count_to_width
 from rsfstudy.plots._style import (
     add_legend,
     add_panel_letters,
@@ -32,7 +32,7 @@ _PANEL_HEIGHT_MM, _MAX_DRAWN_ROWS = 60.0, 20_000
 _ERROR_BAR_HALF_LENGTH_IN_STDERRS = 2.0
 
 
-@partial(error_boundary, is_called_internally=True)
+@partial(error_boundary, applies_to_internal_calls=True)
 def plot_healing(
     table: xr.Dataset, record: Record | None = None, *, style: Any = None, width: Any = None
 ) -> Figure:
@@ -81,7 +81,7 @@ def plot_healing(
         raise DataError("the table contains no holds, so there is nothing to draw.")
     count = 1 if record is None else 2
     with style_context(style, width):
-        columns = limit_panel_columns_to_width(count)
+        columns = limit_panel_column_count_to_width(count)
         rows = count // columns
         figure = NotebookFigure(
             figsize=compute_figure_size_in_inches(columns, rows, _PANEL_HEIGHT_MM),

@@ -23,8 +23,8 @@ from rsfstudy.plots._axes import set_log_scale
 from rsfstudy.plots._image_files import NotebookFigure
 from rsfstudy.plots._size import (
     compute_figure_size_in_inches,
-    compute_max_header_line_length,
-    limit_panel_columns_to_width,
+    compute_max_header_line_characters,
+    limit_panel_column_count_to_width,
 )
 from rsfstudy.plots._style import (
     add_legend,
@@ -52,7 +52,7 @@ _FRICTION_AXIS_LABEL = r"Friction coefficient, $\mu$"
 
 
 @accept_former_keyword_names
-@partial(error_boundary, is_called_internally=True)
+@partial(error_boundary, applies_to_internal_calls=True)
 def plot_motion(
     motion: xr.Dataset,
     rig: Rig | None = None,
@@ -119,7 +119,7 @@ def plot_motion(
     against = against or _choose_x_variable(motion)
     shown = motion if rig is None else rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS)
     with style_context(style, width):
-        figure, upper, lower, plane = _create_motion_panels(limit_panel_columns_to_width(2))
+        figure, upper, lower, plane = _create_motion_panels(limit_panel_column_count_to_width(2))
         for axes in figure.axes:
             freeze_tick_label_size(axes)
         if "friction_coefficient" in shown:
@@ -136,7 +136,7 @@ def plot_motion(
         add_panel_letters(figure.axes)
         if header:
             title = convert_symbols_to_mathtext(_format_motion_title(motion))
-            figure.suptitle(wrap_text(title, compute_max_header_line_length(figure)))
+            figure.suptitle(wrap_text(title, compute_max_header_line_characters(figure)))
         increase_figure_height_for_legends(figure, [[upper], [lower], [plane]])
         finalize_layout(figure)
     return figure
@@ -170,7 +170,7 @@ def _check_motion_variables(motion: xr.Dataset, x_variable: str | None) -> None:
     stress = () if "friction_coefficient" in motion else ("shear_stress",)
     needed = ("slip", x_variable or "time", "frictional_stress", "log10_slip_rate", *stress)
     known = [name for name in X_AXIS_VARIABLES_OF_MOTION if name in motion]
-    for name in (*needed, _find_normal_stress_name(motion), *known):
+    for name in (*needed, _find_normal_stress_variable_name(motion), *known):
         if name not in motion:
             text = "is missing. The dataset is neither a motion from simulate nor a limit cycle"
             raise DataError(f"{name} {text}")
@@ -188,7 +188,7 @@ def _check_motion_variables(motion: xr.Dataset, x_variable: str | None) -> None:
         )
 
 
-def _find_normal_stress_name(motion: xr.Dataset) -> str:
+def _find_normal_stress_variable_name(motion: xr.Dataset) -> str:
     """Return the name of the normal stress variable of a motion."""
     return "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
 
@@ -244,7 +244,7 @@ def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Ax
     scale = float(rates[0]) / 10.0 ** float(logs[0])
     # During ruptures, the spring stress is the sum of the frictional stress and the stress that
     # accelerates the mass.
-    friction = motion["frictional_stress"] / motion[_find_normal_stress_name(motion)]
+    friction = motion["frictional_stress"] / motion[_find_normal_stress_variable_name(motion)]
     axes.plot(scale * 10.0**logs, friction, **cycle_style(0), label="motion")
     axes.plot(
         scale * 10.0 ** logs[0], friction[0], "o", color=cycle_style(0)["color"], label="its start"
@@ -279,12 +279,12 @@ def _compute_steady_state_friction(
     return np.asarray(scene.mu_star + np.array(excess))
 
 
-def _format_axis_label_of_variable(values: xr.DataArray) -> str:
+def _format_axis_label_of_variable(variable: xr.DataArray) -> str:
     """Return the label of an axis from the attributes of a variable."""
-    name = str(values.attrs.get("long_name", values.name))
-    name = name.removesuffix(" since the step") if "phase" in values.dims else name
+    name = str(variable.attrs.get("long_name", variable.name))
+    name = name.removesuffix(" since the step") if "phase" in variable.dims else name
     name = f"{name[:1].upper()}{name[1:]}"
-    units = str(values.attrs.get("scale", values.attrs.get("units", "1")))
+    units = str(variable.attrs.get("scale", variable.attrs.get("units", "1")))
     scales = {"D_c": "$D_c$", "D_c/V_*": "$D_c/V_*$", "sigma_*": r"$\sigma_*$"}
     return f"{name} ({scales.get(units, _format_units(units))})"
 

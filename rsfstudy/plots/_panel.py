@@ -54,7 +54,7 @@ _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
 #: Maximum number of decimal places of a slope.
 _MAX_DECIMALS_OF_SLOPE = 6
 #: Width of the panel letter and of the y tick labels, in characters.
-_WIDTH_LEFT_OF_TITLE_IN_CHARACTERS = 10
+_PANEL_LEFT_MARGIN_IN_CHARACTERS = 10
 _ARRAY_OF_ONE_MISSING_VALUE = xr.DataArray(np.nan)
 
 
@@ -134,7 +134,7 @@ def restrict_panel_to_point_of_extra_dims(
     def title(part: xr.Dataset) -> str:
         """Return the title of the panel with the description of the point."""
         return _join_and_capitalise_phrases(
-            _resolve_text_or_function(panel.title, part, _describe_selected_points(part, own)),
+            _evaluate_text_or_function(panel.title, part, _describe_selected_points(part, own)),
             title_suffix,
         )
 
@@ -179,15 +179,15 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
             axes.set_ylim(top=max(axes.get_ylim()[1], top + 0.05 * (top - limits[0])))
     across, up = estimate_text_capacity_in_characters(axes)
     if label := _format_panel_axis_label(
-        panel.x, panel.x_label, part, across - _WIDTH_LEFT_OF_TITLE_IN_CHARACTERS
+        panel.x, panel.x_label, part, across - _PANEL_LEFT_MARGIN_IN_CHARACTERS
     ):
         axes.set_xlabel(label)
     if label := _format_panel_axis_label(panel.y, panel.y_label, part, up):
         axes.set_ylabel(label)
     title = ", ".join(
-        filter(None, [axes.get_title(), _resolve_text_or_function(panel.title, part, places)])
+        filter(None, [axes.get_title(), _evaluate_text_or_function(panel.title, part, places)])
     )
-    axes.set_title(wrap_text(title, across - _WIDTH_LEFT_OF_TITLE_IN_CHARACTERS))
+    axes.set_title(wrap_text(title, across - _PANEL_LEFT_MARGIN_IN_CHARACTERS))
 
 
 def finalize_scales_and_legends(panels: Sequence[Panel], axes_of_panels: Sequence[Axes]) -> None:
@@ -423,7 +423,7 @@ def _format_panel_axis_label(
     """Return the label of an axis, wrapped to the width of the panel."""
     if declared_label is not None:
         return wrap_text(
-            _resolve_text_or_function(declared_label, panel_data, ""), max_line_characters
+            _evaluate_text_or_function(declared_label, panel_data, ""), max_line_characters
         )
     return (
         format_axis_label(panel_data, variable_or_function, max_line_characters)
@@ -432,7 +432,7 @@ def _format_panel_axis_label(
     )
 
 
-def _resolve_text_or_function(
+def _evaluate_text_or_function(
     text_or_function: Any, panel_data: xr.Dataset, default_text: str
 ) -> str:
     """Return a label or title of a panel, or a default if the text is None.

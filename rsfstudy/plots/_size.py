@@ -75,7 +75,7 @@ def _convert_width_to_mm(width: Any) -> float:
 
 
 def compute_figure_size_in_inches(
-    panel_columns: int, panel_rows: int, panel_height_mm: float | None = None
+    panel_column_count: int, panel_row_count: int, panel_height_mm: float | None = None
 ) -> tuple[float, float]:
     """Compute the size of a figure in inches.
 
@@ -100,12 +100,12 @@ def compute_figure_size_in_inches(
     each = usual if panel_height_mm is None else panel_height_mm / _MM_PER_INCH
     if (requested := _requested_figure_width_mm.get()) is not None:
         width = requested / _MM_PER_INCH
-    elif panel_columns > 1:
+    elif panel_column_count > 1:
         width = 2.0 * width + _JOURNAL_COLUMN_GAP_MM / _MM_PER_INCH
-    return width, panel_rows * each
+    return width, panel_row_count * each
 
 
-def limit_panel_columns_to_width(panel_columns: int) -> int:
+def limit_panel_column_count_to_width(panel_column_count: int) -> int:
     """Return the number of columns of panels that fit into the requested width.
 
     Parameters
@@ -120,11 +120,11 @@ def limit_panel_columns_to_width(panel_columns: int) -> int:
     """
     width = _requested_figure_width_mm.get()
     if width is None:
-        return panel_columns
-    return min(panel_columns, max(1, int(width / _MIN_PANEL_WIDTH_MM)))
+        return panel_column_count
+    return min(panel_column_count, max(1, int(width / _MIN_PANEL_WIDTH_MM)))
 
 
-def compute_max_header_line_length(figure: Figure) -> int:
+def compute_max_header_line_characters(figure: Figure) -> int:
     """Return the number of characters that fit into a line above the panels.
 
     Parameters

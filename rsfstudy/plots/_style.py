@@ -30,7 +30,7 @@ from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue, RsfStudyError, shorten_text
 from rsfstudy.plots._size import figure_width_context
-from rsfstudy.plots._text import estimate_visible_length, wrap_text
+from rsfstudy.plots._text import estimate_visible_character_count, wrap_text
 
 #: Default style sheet of rsfstudy.
 DEFAULT_STYLE_SHEET_PATH = Path(__file__).with_name("rsfstudy.mplstyle")
@@ -38,7 +38,7 @@ DEFAULT_STYLE_SHEET_PATH = Path(__file__).with_name("rsfstudy.mplstyle")
 _STYLE_SHEET_SUFFIX = ".mplstyle"
 _MARKER_CYCLE = "os^Dv<>P*X"
 #: Fraction of the panel width that a colour bar and its label occupy.
-_COLOUR_BAR_FRACTION_OF_PANEL = 0.24
+_COLOUR_BAR_WIDTH_OVER_PANEL_WIDTH = 0.24
 
 
 @accept_former_keyword_names
@@ -274,7 +274,7 @@ def estimate_text_capacity_in_characters(axes: Axes) -> tuple[int, int]:
 # ---- legends ------------------------------------------------------------------------------------
 
 
-def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) -> None:
+def add_legend(axes: Axes, legend_column_count: int = 2, title: str | None = None) -> None:
     """Add a legend below the axes, outside the data area.
 
     Call this function after the x label is set, because the position of the legend depends on the
@@ -299,7 +299,7 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
     # If the legend extended below the colour bar, the layout engine would reduce the width of the
     # panel.
     if getattr(axes, "_colorbars", ()):
-        right -= _COLOUR_BAR_FRACTION_OF_PANEL * (right - left)
+        right -= _COLOUR_BAR_WIDTH_OVER_PANEL_WIDTH * (right - left)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
     made = partial(
         axes.legend,
@@ -309,7 +309,7 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
         title=title,
     )
     _create_legend_that_fits_width(
-        made, shown, legend_columns, 0.97 * (right - left) * figure.bbox.width
+        made, shown, legend_column_count, 0.97 * (right - left) * figure.bbox.width
     )
 
 
@@ -535,6 +535,6 @@ def _wrap_panel_title(axes: Axes) -> None:
     left = panel.x0 if axes.get_title(loc="left") else edges.x0
     free = 1.9 * min(middle - left, edges.x1 - middle)
     if title.get_text() and extent.width > free:
-        longest = max(map(estimate_visible_length, title.get_text().split("\n")))
+        longest = max(map(estimate_visible_character_count, title.get_text().split("\n")))
         text = title.get_text().replace("\n", " ")
         title.set_text(wrap_text(text, int(0.95 * longest * free / extent.width)))

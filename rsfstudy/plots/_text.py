@@ -147,14 +147,14 @@ def wrap_text(text: str, max_line_characters: int) -> str:
     for word in words:
         if (
             lines[-1]
-            and estimate_visible_length(" ".join([*lines[-1], word])) > max_line_characters
+            and estimate_visible_character_count(" ".join([*lines[-1], word])) > max_line_characters
         ):
             lines.append([])
         lines[-1].append(word)
     return "\n".join(" ".join(line) for line in lines)
 
 
-def estimate_visible_length(text: str) -> int:
+def estimate_visible_character_count(text: str) -> int:
     """Estimate the number of visible characters of a string.
 
     Parameters

@@ -34,7 +34,7 @@ _MAX_SCATTERED_QUANTITIES, _MAX_TICKS = 4, 3
 #: Maximum number of parameters in the corner plot of posterior draws.
 _MAX_SCATTERED_PARAMETERS = 6
 #: Maximum number of columns of a figure that is as wide as one column of a journal page.
-_MAX_COLUMNS_IN_NARROW_FIGURE = 2
+_MAX_PANEL_COLUMNS_OF_NARROW_FIGURE = 2
 #: Style of the points in scatter plots. The points are rasterised in vector graphics, because there
 #: may be 10^5 points.
 _SCATTER_POINT_STYLE = {"marker": ".", "markeredgewidth": 0.0, "rasterized": True}
@@ -64,7 +64,7 @@ class CornerFigure(Figure):
     def compute_size_in_inches(self) -> tuple[float, float]:
         """Return the width and the height of the figure in inches."""
         width, height = compute_figure_size_in_inches(
-            1 if self.columns <= _MAX_COLUMNS_IN_NARROW_FIGURE else 2, 1
+            1 if self.columns <= _MAX_PANEL_COLUMNS_OF_NARROW_FIGURE else 2, 1
         )
         return width, width if self.columns > 1 else height
 

@@ -33,7 +33,7 @@ _MARGIN_FRACTION_BESIDE_RECORD = 0.02
 _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
 #: Maximum number of parameters of a correlation matrix whose cells contain numbers. A colour bar
 #: replaces the numbers in larger matrices.
-_MAX_PARAMETERS_WITH_WRITTEN_VALUES = 8
+_MAX_PARAMETERS_WITH_CORRELATION_TEXT = 8
 #: Margin above and below the visible curves as a fraction of their range.
 _Y_MARGIN_FRACTION = 0.05
 #: Half width of the confidence band of the fitted curve, in standard errors.
@@ -48,7 +48,7 @@ _LINE_STYLE_OF_RECORD_ROWS: dict[str, Any] = {
 _DISPLACEMENT_LABEL = r"Load point displacement ($\mu$m)"
 
 
-def build_panels_of_figure(dataset: xr.Dataset) -> Sequence[Panel]:
+def build_fit_panels(dataset: xr.Dataset) -> Sequence[Panel]:
     """Build the panels of the figure of a fit.
 
     Parameters
@@ -297,7 +297,7 @@ def _draw_parameter_correlation_matrix(dataset: xr.Dataset, axes: Axes) -> None:
     image = axes.imshow(values, vmin=-1.0, vmax=1.0, cmap=colours, aspect="auto")
     axes.grid(visible=False)
     _label_rows_and_columns_of_matrix(axes, names)
-    if len(names) <= _MAX_PARAMETERS_WITH_WRITTEN_VALUES:
+    if len(names) <= _MAX_PARAMETERS_WITH_CORRELATION_TEXT:
         _write_correlation_coefficients(axes, values)
     else:
         bar = cast(Figure, axes.figure).colorbar(image, ax=axes, pad=0.02)
@@ -319,7 +319,7 @@ def _label_rows_and_columns_of_matrix(axes: Axes, parameter_symbols: Sequence[st
     for axis, length in ((axes.xaxis, width), (axes.yaxis, height)):
         some = slice(None, None, max(1, math.ceil(len(parameter_symbols) * line / length)))
         axis.set_ticks(range(len(parameter_symbols))[some], parameter_symbols[some])
-    if len(parameter_symbols) > _MAX_PARAMETERS_WITH_WRITTEN_VALUES:
+    if len(parameter_symbols) > _MAX_PARAMETERS_WITH_CORRELATION_TEXT:
         axes.tick_params(axis="x", labelrotation=90.0)
     axes.tick_params(length=0)
 

@@ -36,12 +36,12 @@ from rsfstudy.study import Panel
 #: numeric axis above which a colour scale is used.
 _MAX_PANELS, _MAX_LEGEND_LINES, _MAX_CYCLED_COLOURS = 4, 12, 6
 #: Maximum number of identical curves whose names are all listed in the legend.
-_MAX_NAMED_IDENTICAL_CURVES = 3
+_MAX_IDENTICAL_CURVES_LISTED_IN_LEGEND = 3
 #: Number of points of a line above which markers are omitted.
 _MAX_POINTS_WITH_MARKERS = 60
 
 
-def build_panels_of_figure(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
+def build_line_panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     """Build the line plots of one or several variables.
 
     Parameters
@@ -101,7 +101,9 @@ def _draw_lines_of_variable(
     numeric = bool(x_dimension) and has_numeric_points(dataset, x_dimension)
     coloured = _choose_colour_dimension(dataset, values, x_dimension)
     others = [str(d) for d in values.dims if d not in (x_dimension, coloured)]
-    curves = _find_distinct_curves(list(_iterate_values_at_points(values, others)), others)
+    curves = _group_and_describe_identical_curves(
+        list(_iterate_values_at_points(values, others)), others
+    )
     for number, (group, text) in enumerate(curves):
         style = cycle_style(number) | {
             "label": text if number < _MAX_LEGEND_LINES and text else None
@@ -186,7 +188,7 @@ def _iterate_values_at_points(
         yield values.isel(dict(zip(dimensions, places, strict=True)))
 
 
-def _find_distinct_curves(
+def _group_and_describe_identical_curves(
     curves: Sequence[xr.DataArray], dimensions: Sequence[str]
 ) -> list[tuple[xr.DataArray, str]]:
     """Group identical curves and describe the points of each group.
@@ -220,6 +222,6 @@ def _describe_points_of_identical_curves(
     if not places or any(len(names) == 1 for names in places):
         return tuple(names[0] for names in places if len(names) == 1)
     every = [", ".join(describe_point(one, d) for d in dimensions) for one in identical_curves]
-    if len(every) <= _MAX_NAMED_IDENTICAL_CURVES:
+    if len(every) <= _MAX_IDENTICAL_CURVES_LISTED_IN_LEGEND:
         return (" and ".join(every),)
     return (f"{every[0]} and {len(every) - 1} more",)

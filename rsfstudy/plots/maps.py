@@ -53,7 +53,7 @@ _MIN_AXIS_POINTS_FOR_CONTOURS = 6
 _STATUS_LABEL_BY_CODE = {int(status): status.label for status in Status}
 
 
-def build_panels_of_figure(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
+def build_map_panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     """Build the maps of a variable.
 
     Parameters
@@ -192,7 +192,7 @@ def _choose_colour_scale_and_contour_levels(
 # ---- contents of a map --------------------------------------------------------------------------
 
 
-def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[float]) -> None:
+def draw_contours(axes: Axes, map_values: xr.DataArray, contour_levels: Sequence[float]) -> None:
     """Draw labelled contours of a variable.
 
     Contours are drawn only if both axes have at least six points.
@@ -206,13 +206,13 @@ def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[flo
     contour_levels : sequence of float
         Values of the variable at the contours.
     """
-    y, x = (values[dimension].values for dimension in values.dims)
-    if min(values.shape) < _MIN_AXIS_POINTS_FOR_CONTOURS or not len(contour_levels):
+    y, x = (map_values[dimension].values for dimension in map_values.dims)
+    if min(map_values.shape) < _MIN_AXIS_POINTS_FOR_CONTOURS or not len(contour_levels):
         return
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels were found")
         found = axes.contour(
-            x, y, values, contour_levels, colors="white", linewidths=0.6, linestyles="-"
+            x, y, map_values, contour_levels, colors="white", linewidths=0.6, linestyles="-"
         )
     for text in axes.clabel(
         found,

@@ -136,18 +136,18 @@ class AnswerComparison:
         for agreement in self.quantity_agreements:
             text = (
                 f"  {agreement.quantity_name:20s} "
-                f"{round_digits_down(agreement.agreeing_digits):4.1f} digits"
+                f"{round_digit_count_down(agreement.agreeing_digits):4.1f} digits"
             )
             if agreement.agrees_within_rounding_error:
                 text += ", all written decimal places"
             elif agreement.agreeing_digits == problem.digits:
                 text += ", all known digits"
-            elif problem.index_column_name:
+            elif problem.answer_index_column_name:
                 text += (
                     ", lowest agreement at "
                     f"{_format_index_value_of_row(problem, agreement.least_agreeing_row)}"
                 )
-            if agreement.first_failing_row is not None and problem.index_column_name:
+            if agreement.first_failing_row is not None and problem.answer_index_column_name:
                 text += (
                     "; fewer digits than required from "
                     f"{_format_index_value_of_row(problem, agreement.first_failing_row)}"
@@ -158,8 +158,8 @@ class AnswerComparison:
 
 def _format_index_value_of_row(problem: BenchmarkProblem, row: int) -> str:
     """Format the value in the index column of a row, with units."""
-    units = {"time": " s"}.get(problem.index_column_name, "")
-    return f"{problem.index_column_name} = {problem.index_values[row]:g}{units}"
+    units = {"time": " s"}.get(problem.answer_index_column_name, "")
+    return f"{problem.answer_index_column_name} = {problem.answer_index_values[row]:g}{units}"
 
 
 def read_or_compute_known_answer(
@@ -257,12 +257,12 @@ def compare_answers(
     )
     better = best >= max(_MIN_EXPLAINED_DIGITS, found.agreeing_digits + _MIN_DIGITS_GAINED)
     explanation = (
-        f"{words}. With this convention corrected, {round_digits_down(best):.1f} digits agree"
+        f"{words}. With this convention corrected, {round_digit_count_down(best):.1f} digits agree"
     )
     return replace(found, explanation_of_disagreement=explanation if better else "")
 
 
-def round_digits_down(digits: float) -> float:
+def round_digit_count_down(digit_count: float) -> float:
     """Round a number of digits down to one decimal place.
 
     The number is rounded down, so that the displayed number of a failed answer is always less than
@@ -278,7 +278,7 @@ def round_digits_down(digits: float) -> float:
     float
         Rounded number of digits.
     """
-    return math.floor(10.0 * digits) / 10.0
+    return math.floor(10.0 * digit_count) / 10.0
 
 
 def _compare_quantities(
@@ -405,13 +405,13 @@ def _iterate_answers_in_other_conventions(
             yield words, reported_answer | {name: reported_answer[name] / factor}
         if several:
             apart = float(np.median(reported_answer[name] - known_answer[name]))
-            words = f"{name} is shifted by {apart:.6g} {problem.quantity_units[name]}".removesuffix(
+            words = f"{name} is shifted by {apart:.6g} {problem.si_units_by_quantity[name]}".removesuffix(
                 " 1"
             )
             yield words, reported_answer | {name: reported_answer[name] - apart}
 
 
-def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
+def _find_common_conversion_factor(factor: float, rtol: float) -> tuple[str, float] | None:
     """Find a common conversion factor that is close to a given factor.
 
     The relative difference between the given factor and the common conversion factor must not
@@ -423,10 +423,10 @@ def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str
         Description and value of the common conversion factor, or None if no common conversion
         factor matches.
     """
-    if math.isclose(factor, -1.0, rel_tol=tolerance):
+    if math.isclose(factor, -1.0, rel_tol=rtol):
         return "has the opposite sign", -1.0
     for words, usual in _COMMON_CONVERSION_FACTOR_BY_NAME.items():
-        if math.isclose(abs(factor), usual, rel_tol=tolerance):
+        if math.isclose(abs(factor), usual, rel_tol=rtol):
             sign = "-" if factor < 0.0 else ""
             return f"is {sign}{words} times the reference value", math.copysign(usual, factor)
     return None

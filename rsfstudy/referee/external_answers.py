@@ -81,20 +81,20 @@ def read_external_answer(
     # The number of rows is checked first, because the conversion of columns uses the times of the
     # problem.
     rows, count = (
-        problem.index_values,
+        problem.answer_index_values,
         max((len(column.values) for column in table.values()), default=0),
     )
     if count != len(rows):
         remedy = (
-            f"Write one row for each {problem.index_column_name} of the problem. Rows are not "
+            f"Write one row for each {problem.answer_index_column_name} of the problem. Rows are not "
             "interpolated."
         )
         rule = f"must be {len(rows)}"
         wrong = InvalidValue(
-            "number of rows", count, rule, remedy=remedy if problem.index_column_name else ""
+            "number of rows", count, rule, remedy=remedy if problem.answer_index_column_name else ""
         )
         raise wrong.with_location(str(path))
-    asked = {*problem.column_names, *_UNITS_BY_SUBSTITUTE_QUANTITY}
+    asked = {*problem.answer_column_names, *_UNITS_BY_SUBSTITUTE_QUANTITY}
     found = {
         key: _convert_column_to_si(key, column, problem)
         for key, column in table.items()
@@ -103,26 +103,31 @@ def read_external_answer(
     for name, (other, _units) in _SUBSTITUTE_AND_UNITS_BY_QUANTITY.items():
         # With radiation damping, the slip rate is required to convert shear stress to friction.
         waits = name == "friction" and problem.radiation_damping and "slip_rate" not in found
-        if name in problem.quantity_units and name not in found and other in found and not waits:
+        if (
+            name in problem.si_units_by_quantity
+            and name not in found
+            and other in found
+            and not waits
+        ):
             found[name] = ReportedQuantity(
                 _derive_quantity_from_substitute(name, problem, found), 0.0
             )
-    for name in reversed(problem.column_names):
+    for name in reversed(problem.answer_column_names):
         if name not in found:
             remedy = (
-                f"Use the heading {name} ({problem.quantity_units[name]}), or pass --columns "
+                f"Use the heading {name} ({problem.si_units_by_quantity[name]}), or pass --columns "
                 f"'{name}=...'."
             )
             wrong = InvalidValue("column", name, "is missing", choices=table, remedy=remedy)
             raise wrong.with_location(str(path))
-    if problem.index_column_name:
+    if problem.answer_index_column_name:
         _check_index_values(
-            table[problem.index_column_name],
-            found[problem.index_column_name].si_values,
+            table[problem.answer_index_column_name],
+            found[problem.answer_index_column_name].si_values,
             rows,
             problem,
         )
-    return {name: found[name] for name in problem.column_names}
+    return {name: found[name] for name in problem.answer_column_names}
 
 
 def _derive_quantity_from_substitute(
@@ -153,7 +158,8 @@ def _convert_column_to_si(
 ) -> ReportedQuantity:
     """Convert a column to SI units."""
     units = (
-        problem.quantity_units.get(quantity_name) or _UNITS_BY_SUBSTITUTE_QUANTITY[quantity_name]
+        problem.si_units_by_quantity.get(quantity_name)
+        or _UNITS_BY_SUBSTITUTE_QUANTITY[quantity_name]
     )
     one = "1" if column.units in ("", "1") else f"1 {column.units}"
     if units != "1" and one == "1":
@@ -202,9 +208,9 @@ def _check_index_values(
         np.abs(values - expected_values)
         > _RTOL_FOR_MATCHING_ANSWER_TIMES * np.abs(expected_values).max()
     )
-    wanted = (
-        f"{expected_values[np.argmax(wrong)]:g} {problem.quantity_units[problem.index_column_name]}"
-    )
+    wanted = f"{expected_values[np.argmax(wrong)]:g} {problem.si_units_by_quantity[problem.answer_index_column_name]}"
     column._replace(values=values).raise_for_invalid_values(
-        problem.index_column_name, wrong, f"must be {wanted}, because rows are not interpolated"
+        problem.answer_index_column_name,
+        wrong,
+        f"must be {wanted}, because rows are not interpolated",
     )

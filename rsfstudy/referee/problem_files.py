@@ -154,12 +154,16 @@ class BenchmarkProblem:
             )
         if not self.quantities:
             rule = "must list at least one quantity"
-            raise InvalidValue("quantities", self.quantities, rule, choices=self.quantity_units)
+            raise InvalidValue(
+                "quantities", self.quantities, rule, choices=self.si_units_by_quantity
+            )
         if not 1 <= self.digits <= _MAX_DIGITS:
             raise InvalidValue("digits", self.digits, f"must lie between 1 and {_MAX_DIGITS}")
         for name in self.quantities:
-            if name not in self.quantity_units:
-                raise InvalidValue("quantities", name, "is unknown", choices=self.quantity_units)
+            if name not in self.si_units_by_quantity:
+                raise InvalidValue(
+                    "quantities", name, "is unknown", choices=self.si_units_by_quantity
+                )
         times = np.array(self.times, dtype=float)
         if self.report == "series" and not (len(times) and np.isfinite(times).all()):
             raise InvalidValue("times", self.times, "must list the times of a series, in s")
@@ -190,12 +194,12 @@ class BenchmarkProblem:
             raise InvalidValue("initial", [*self.initial], rule)
 
     @property
-    def quantity_units(self) -> Mapping[str, str]:
+    def si_units_by_quantity(self) -> Mapping[str, str]:
         """SI units of the quantities that can be requested, by name."""
         return SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND[self.report]
 
     @property
-    def index_column_name(self) -> str:
+    def answer_index_column_name(self) -> str:
         """Name of the column that identifies the rows of the answer.
 
         The name is empty if the answer consists of a single row.
@@ -203,16 +207,16 @@ class BenchmarkProblem:
         return {"series": "time", "peaks": "event", "numbers": ""}[self.report]
 
     @property
-    def column_names(self) -> tuple[str, ...]:
+    def answer_column_names(self) -> tuple[str, ...]:
         """Names of the columns of the answer."""
         return (
-            (self.index_column_name, *self.quantities)
-            if self.index_column_name
+            (self.answer_index_column_name, *self.quantities)
+            if self.answer_index_column_name
             else tuple(self.quantities)
         )
 
     @property
-    def index_values(self) -> np.ndarray:
+    def answer_index_values(self) -> np.ndarray:
         """Values of the index column: times in s, or numbers of the peaks.
 
         For an answer with a single row, the array contains the value 1.
@@ -221,9 +225,9 @@ class BenchmarkProblem:
         return np.array(rows, dtype=float)
 
     @property
-    def column_headings(self) -> list[str]:
+    def answer_column_headings(self) -> list[str]:
         """Headings of the columns of the answer, with units."""
-        return [f"{name} ({self.quantity_units[name]})" for name in self.column_names]
+        return [f"{name} ({self.si_units_by_quantity[name]})" for name in self.answer_column_names]
 
     @cached_property
     def rig(self) -> Rig:
@@ -344,7 +348,10 @@ class BenchmarkProblem:
             self.initial_log_slip_rate,
             self._compute_initial_state_variables(),
         )
-        acting, before = scene.continuous_segments[0][0], scene.with_segment(Segment(1.0))
+        acting, before = (
+            scene.segment_sequences_without_jumps[0][0],
+            scene.with_segment(Segment(1.0)),
+        )
         friction = scene.a * x + sum(states)
         if scene.parts.law.regularised:
             above = (scene.mu_star + friction) / scene.a
@@ -522,8 +529,12 @@ def write_shipped_problems(directory: Path) -> int:
 def _write_answer_template(problem: BenchmarkProblem, path: Path) -> None:
     """Write a table with the headings and the index column of an answer."""
     empty = [""] * len(problem.quantities)
-    rows = [f"{row:.12g}" for row in problem.index_values] if problem.index_column_name else []
+    rows = (
+        [f"{row:.12g}" for row in problem.answer_index_values]
+        if problem.answer_index_column_name
+        else []
+    )
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(problem.column_headings)
+        table.writerow(problem.answer_column_headings)
         table.writerows([[row, *empty] for row in rows] or [empty])

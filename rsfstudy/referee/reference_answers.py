@@ -10,7 +10,7 @@ import numpy as np
 
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
-from rsfstudy.motion import Accuracy, EventKind, Integrator, MotionStopped, Recording, maximum
+from rsfstudy.motion import Accuracy, EventKind, Integrator, MotionRecorder, MotionStopped, maximum
 from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.status import Status
 
@@ -42,14 +42,14 @@ def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColum
     """
     found = {
         "series": _compute_series_answer,
-        "peaks": _compute_times_and_rates_of_peaks,
+        "peaks": _compute_times_and_slip_rates_of_peaks,
         "numbers": _compute_requested_scalar_quantities,
     }[problem.report]
     try:
         told = found(problem, accuracy)
     except MotionStopped as halt:
         raise RsfStudyError(f"{problem.title}: {halt.status.label} ({halt})") from halt
-    return {name: told[name] for name in problem.column_names}
+    return {name: told[name] for name in problem.answer_column_names}
 
 
 def compute_effective_normal_stress_series(problem: BenchmarkProblem) -> np.ndarray:
@@ -79,7 +79,7 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
     """
     scene, rig = problem.scene, problem.rig
     at = np.array(problem.times) * rig.dimensionless("1 s")
-    recording = Recording(sample_times=at)
+    recording = MotionRecorder(sample_times=at)
     moving = Integrator(accuracy).follow(
         scene,
         recording=recording,
@@ -89,9 +89,9 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
     for _ in moving:
         pass
     seen = recording.as_table(scene)
-    told = dict(zip(Recording.MOTION_VARIABLE_NAMES, seen.T, strict=False))
+    told = dict(zip(MotionRecorder.MOTION_VARIABLE_NAMES, seen.T, strict=False))
     sigma, b = rig.normal_stress, np.array(problem.b_values)
-    states = seen[:, Recording.FIRST_STATE_COLUMN : Recording.FIRST_STATE_COLUMN + len(b)]
+    states = seen[:, MotionRecorder.FIRST_STATE_COLUMN : MotionRecorder.FIRST_STATE_COLUMN + len(b)]
     taken = states.sum(axis=1) - told["state_variable"]
     states = states - np.outer(taken, np.abs(b) / np.abs(b).sum())
     thetas = (np.array(problem.steady_thetas_at_reference_velocity) * np.exp(states / b)).T
@@ -108,7 +108,7 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
     }
 
 
-def _compute_times_and_rates_of_peaks(
+def _compute_times_and_slip_rates_of_peaks(
     problem: BenchmarkProblem, accuracy: Accuracy
 ) -> AnswerColumnByQuantity:
     """Compute the times and values of slip rate maxima."""

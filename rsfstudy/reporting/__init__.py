@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     )
     from rsfstudy.reporting.event_tables import (
         build_record_events_tables_and_sentences,
-        summarise_record_events_as_fields,
+        summarise_events_as_json_fields,
     )
     from rsfstudy.reporting.fit_summaries import format_value_with_stderr
     from rsfstudy.reporting.fit_tables import (
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
         build_fit_table,
         contains_fits,
         split_into_single_fits,
-        summarise_fits_as_fields,
+        summarise_fits_as_json_fields,
     )
     from rsfstudy.reporting.hold_summaries import is_hold_table, summarise_holds
     from rsfstudy.reporting.json_summaries import (
         build_result_variables_table,
         classify_file_contents,
-        summarise_file_as_fields,
-        summarise_study_as_fields,
+        summarise_file_as_json_fields,
+        summarise_study_as_json_fields,
     )
     from rsfstudy.reporting.lattice_tables import (
         summarise_study_as_text_lines,
@@ -126,7 +126,7 @@ __all__ = [
     "are_all_fits_valid",
     "build_result_variables_table",
     "build_record_events_tables_and_sentences",
-    "summarise_record_events_as_fields",
+    "summarise_events_as_json_fields",
     "build_data_frame_of_cells",
     "build_motion_tables_and_sentences",
     "build_reduction_tables_and_sentences",
@@ -147,12 +147,12 @@ __all__ = [
     "contains_fits",
     "is_hold_table",
     "is_motion",
-    "summarise_fits_as_fields",
+    "summarise_fits_as_json_fields",
     "describe_slow_instability_norms",
     "split_into_single_fits",
-    "summarise_file_as_fields",
+    "summarise_file_as_json_fields",
     "summarise_holds",
-    "summarise_study_as_fields",
+    "summarise_study_as_json_fields",
     "summarise_study_as_text_lines",
     "summarise_verdicts_and_failures",
 ]

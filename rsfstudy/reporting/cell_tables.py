@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.formatting import format_count_with_noun, format_nonempty_fields
+from rsfstudy.formatting import format_count_with_noun, format_fields_except_none
 from rsfstudy.reporting.reduction_tables import (
     find_reasons_of_refused_reductions,
     format_missing_results,
@@ -145,7 +145,7 @@ def build_failed_cells_table(dataset: xr.Dataset, results_file: str) -> TextTabl
     first = found[:_MAX_FAILED_CELLS_IN_TABLE]
     places: list[dict[Any, Any]] = first[list(failed.dims)].to_dict("records")
     rows = [
-        {"cell": format_nonempty_fields(place), "status": label, "message": message}
+        {"cell": format_fields_except_none(place), "status": label, "message": message}
         for place, label, message in zip(places, first["status"], first["message"], strict=True)
     ]
     commands = [format_recompute_command(dataset, results_file, place) for place in places]

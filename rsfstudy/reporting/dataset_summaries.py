@@ -24,7 +24,7 @@ from rsfstudy.reporting.reduction_tables import (
     format_missing_results,
 )
 from rsfstudy.reporting.text_tables import (
-    MAX_CELLS_IN_THINNED_TABLE,
+    MAX_ROWS_IN_THINNED_TABLE,
     TextTable,
     build_single_scene_result_table,
     format_number_or_dash,
@@ -62,7 +62,7 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
         yield summarise_motion(dataset)
         try:
             yield describe_stability(dataset.rsf.scene)
-            yield from describe_default_friction(dataset.rsf.scene)
+            yield from describe_friction_if_default(dataset.rsf.scene)
             yield build_events_table(dataset.rsf.events())
         except InvalidValue as error:  # The scene has a user-defined part.
             yield f"stability and events are unavailable: {error}"
@@ -90,7 +90,7 @@ def build_motion_tables_and_sentences(
         Peak values of the motion, stability of the scene, a note if the reference friction has its
         default value, and table of the events.
     """
-    notes = [describe_stability(scene), *describe_default_friction(scene)]
+    notes = [describe_stability(scene), *describe_friction_if_default(scene)]
     return [summarise_motion(motion), *notes, build_events_table(event_catalogue)]
 
 
@@ -214,7 +214,7 @@ def describe_stability(scene: Scene) -> str:
     return f"stiffness is {ratio}: steady sliding at V_* is {sliding}"
 
 
-def describe_default_friction(scene: Scene) -> list[str]:
+def describe_friction_if_default(scene: Scene) -> list[str]:
     """Return a note if the friction coefficient at V_* has its default value.
 
     Parameters
@@ -260,7 +260,7 @@ def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:
         heads[name] = words if unit == "1" else f"{words} ({unit})"
     flags = read_flag_meanings(event_catalogue["cut"].attrs) | {0: "-"}
     rows = []
-    for place in range(min(count, MAX_CELLS_IN_THINNED_TABLE)):
+    for place in range(min(count, MAX_ROWS_IN_THINNED_TABLE)):
         event = event_catalogue.isel(event=place)
         row = {
             words: format_number_or_dash(float(event[name]), ".4g") for name, words in heads.items()

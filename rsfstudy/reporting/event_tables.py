@@ -72,7 +72,7 @@ def build_record_events_tables_and_sentences(event_catalogue: xr.Dataset) -> lis
     return pieces
 
 
-def summarise_record_events_as_fields(event_catalogue: xr.Dataset) -> dict[str, Any]:
+def summarise_events_as_json_fields(event_catalogue: xr.Dataset) -> dict[str, Any]:
     """Return the stress drops in a record as numbers, strings and lists.
 
     Parameters

@@ -70,7 +70,7 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
             yield _build_parameter_table(where, fits[first : first + _MAX_FITS_PER_TABLE])
         for one in fits:
             yield from _iterate_fit_remarks(one)
-        yield from _compare_laws_of_fits(fits)
+        yield from _compare_laws_by_aic(fits)
     fitted = [one for where, fits in places.items() if where not in unfitted for one in fits]
     if several and fitted:
         yield TextTable([_build_summary_row_of_fit(one) for one in fitted], "All fits:")
@@ -85,7 +85,7 @@ def _describe_unfitted_step(record_and_step: str, fits: Sequence[xr.Dataset]) ->
     return f"{record_and_step} is not fitted: {'; '.join(reasons)}"
 
 
-def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
+def _compare_laws_by_aic(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Yield a sentence that names the law with the lowest AIC.
 
     The sentence also states whether the AIC of the second-best law is significantly higher.

@@ -15,14 +15,14 @@ from rsfstudy.fitting import (
     PARAMETERS,
     split_window_number,
 )
-from rsfstudy.former_data_names import TableWithFormerColumns, rename_former_variables
-from rsfstudy.quantities import read_units_or_scale
+from rsfstudy.former_data_names import TableAcceptingFormerColumnNames, rename_former_variables
+from rsfstudy.quantities import read_units_or_reference_scale
 from rsfstudy.reporting.text_tables import format_units
 from rsfstudy.status import Status
 
 #: Names that laboratories use for parameters, by parameter name in rsfstudy. The mapping contains
 #: only the parameters whose names differ.
-_LABORATORY_NAME_BY_PARAMETER_NAME = {
+_LABORATORY_NOTATION_BY_PARAMETER = {
     "slip_distance": "Dc",
     "slip_distance_2": "Dc2",
     "mu_star": "mu_0",
@@ -115,7 +115,7 @@ def find_parameter_headings(fit: xr.Dataset) -> dict[str, str]:
     names, found = [*map(str, fit["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
         for name in (n for n in names if split_window_number(n)[0] == short):
-            found[name] = _LABORATORY_NAME_BY_PARAMETER_NAME.get(short, short) + name.removeprefix(
+            found[name] = _LABORATORY_NOTATION_BY_PARAMETER.get(short, short) + name.removeprefix(
                 short
             )
     return found
@@ -144,7 +144,7 @@ def scene_fields_set_by_fit(dataset: xr.Dataset) -> set[str]:
     return fields | ({"length_ratio"} if fitted & {"slip_distance", "slip_distance_2"} else set())
 
 
-class FitTable(TableWithFormerColumns):
+class FitTable(TableAcceptingFormerColumnNames):
     """Table of fits, with one row per fit.
 
     Selections from the table are ordinary data frames.
@@ -190,9 +190,12 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
             for suffix in ("", "_stderr", "_windows"):
                 if f"{name}{suffix}" in one:
                     row[f"{short}{suffix}"] = one[f"{name}{suffix}"].item()
-                    units[f"{short}{suffix}"] = read_units_or_scale(one[name].attrs)
+                    units[f"{short}{suffix}"] = read_units_or_reference_scale(one[name].attrs)
         for short, name in (("V0", "velocity_before"), ("V1", "velocity_after")):
-            row[short], units[short] = one[name].item(), read_units_or_scale(one[name].attrs)
+            row[short], units[short] = (
+                one[name].item(),
+                read_units_or_reference_scale(one[name].attrs),
+            )
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
         stresses = find_normal_stresses_in_mpa(one)
         row |= stresses
@@ -202,7 +205,7 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
             if stderr := find_stderr_of_fixed_stiffness(one):
                 row["k_stderr"] = stderr
             units |= dict.fromkeys(
-                ("k", "k_stderr"), read_units_or_scale(one["window_stiffness"].attrs)
+                ("k", "k_stderr"), read_units_or_reference_scale(one["window_stiffness"].attrs)
             )
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["aic"] = one["r_squared"].item(), one["aic"].item()
@@ -215,7 +218,7 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     return table
 
 
-def summarise_fits_as_fields(dataset: xr.Dataset) -> list[dict[str, Any]]:
+def summarise_fits_as_json_fields(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the results of each fit as a dictionary for JSON output.
 
     Parameters

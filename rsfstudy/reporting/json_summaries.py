@@ -17,7 +17,7 @@ from rsfstudy.reporting.cell_tables import (
     count_pending_cells,
 )
 from rsfstudy.reporting.dataset_summaries import compute_duration_and_peaks_of_motion, is_motion
-from rsfstudy.reporting.fit_tables import contains_fits, summarise_fits_as_fields
+from rsfstudy.reporting.fit_tables import contains_fits, summarise_fits_as_json_fields
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
 from rsfstudy.reporting.origin_descriptions import find_constant_fields
 from rsfstudy.reporting.reduction_tables import (
@@ -29,7 +29,7 @@ from rsfstudy.storage import StoredDataset
 from rsfstudy.vocabulary import find_coverage_content_type
 
 
-def summarise_study_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
+def summarise_study_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     """Summarise the results of a study.
 
     Parameters
@@ -83,7 +83,7 @@ def classify_file_contents(dataset: xr.Dataset) -> str:
     return "motion" if is_motion(dataset) else "scene"
 
 
-def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
+def summarise_file_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     """Summarise the data in a file.
 
     Parameters
@@ -101,9 +101,9 @@ def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     kind = classify_file_contents(dataset)
     about = {"kind": kind, "file": file}
     if kind == "results":
-        return about | _summarise_study_results_as_fields(dataset, file)
+        return about | _summarise_results_as_json_fields(dataset, file)
     if kind == "fit":
-        return about | {"fits": summarise_fits_as_fields(dataset)}
+        return about | {"fits": summarise_fits_as_json_fields(dataset)}
     about["status"] = dataset.attrs["status"]
     about["message"] = dataset.attrs.get("message", "")
     scene = {"scene": _omit_fields_with_value_none(StoredDataset(dataset).scene_fields)}
@@ -112,11 +112,11 @@ def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     return about | scene | {"values": build_single_scene_result_table(dataset).unformatted_rows}
 
 
-def _summarise_study_results_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
+def _summarise_results_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     """Summarise the results and the provenance of a study."""
     about, sizes = StoredDataset(dataset).provenance, dataset.sizes
     scene, rig = find_constant_fields(dataset)
-    return summarise_study_as_fields(dataset, file) | {
+    return summarise_study_as_json_fields(dataset, file) | {
         "lattice": {str(dimension): sizes[dimension] for dimension in dataset["status"].dims},
         "scene": _omit_fields_with_value_none(scene),
         "rig": rig,

@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from rsfstudy.formatting import format_list, format_value
+from rsfstudy.formatting import format_abbreviated_list, format_number_or_text
 from rsfstudy.reporting.cell_tables import format_status_counts
 from rsfstudy.reporting.reduction_tables import list_names_of_slope_reductions
 from rsfstudy.reporting.text_tables import (
-    MAX_CELLS_IN_THINNED_TABLE,
+    MAX_ROWS_IN_THINNED_TABLE,
     TextTable,
     TextTableColumn,
     build_table_along_dimensions,
@@ -27,10 +27,10 @@ from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 
 #: Maximum number of cells in a table that shows all cells.
-_MAX_CELLS_SHOWN_WITHOUT_THINNING = 36
+_MAX_ROWS_WITHOUT_THINNING = 36
 #: Maximum number of fields per point of a numbered axis. If there are more fields, a table shows
 #: only a selection of the cells.
-_MAX_FIELDS_PER_POINT_WITHOUT_THINNING = 4
+_MAX_FIELD_COLUMNS_WITHOUT_THINNING = 4
 
 
 def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
@@ -54,19 +54,19 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     if name is None:
         return TextTable([])
     dataset = DatasetUnits(dataset).convert_to_display_units()
-    name = name if name in dataset else DatasetUnits.convert_to_dimensional_name(name)
+    name = name if name in dataset else DatasetUnits.convert_to_dimensional_variable_name(name)
     dims = dataset["status"].dims
     drawn = [n for n in _find_fields_along_numbered_axes(dataset) if n in dataset.coords]
-    columns = [TextTableColumn(format_axis_name(dataset[n]), n, format_value) for n in drawn]
+    columns = [
+        TextTableColumn(format_axis_name(dataset[n]), n, format_number_or_text) for n in drawn
+    ]
     columns.append(TextTableColumn(name, name, format_number_or_dash, "value"))
     if f"{name}_error" in dataset:
         short = partial(format_number_or_dash, format_specification=".1e")
         columns.append(TextTableColumn("error", f"{name}_error", short, "error"))
-    size, fewer = dataset["status"].size, 1 + len(drawn) // _MAX_FIELDS_PER_POINT_WITHOUT_THINNING
+    size, fewer = dataset["status"].size, 1 + len(drawn) // _MAX_FIELD_COLUMNS_WITHOUT_THINNING
     most = (
-        size
-        if size <= _MAX_CELLS_SHOWN_WITHOUT_THINNING // fewer
-        else MAX_CELLS_IN_THINNED_TABLE // fewer
+        size if size <= _MAX_ROWS_WITHOUT_THINNING // fewer else MAX_ROWS_IN_THINNED_TABLE // fewer
     )
     at = select_thinned_points({str(d): dataset.sizes[d] for d in dims}, most)
     few = dataset[[*(column.variable_name for column in columns), "status"]].isel(at).load()
@@ -142,13 +142,15 @@ def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
     lines, converted = [], DatasetUnits(dataset).convert_to_display_units()
     if (name := StoredDataset(dataset).primary_output_name) is not None:
         values = converted[
-            name if name in converted else DatasetUnits.convert_to_dimensional_name(name)
+            name if name in converted else DatasetUnits.convert_to_dimensional_variable_name(name)
         ]
         told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
-        ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
+        ends = " to ".join(map(format_number_or_text, dict.fromkeys((*told[:1], *told[-1:]))))
         text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no values"
         lines.append(f"{values.name}: {text}")
     for slope in list_names_of_slope_reductions(converted):
         slopes, units = converted[slope].values.ravel().tolist(), format_units(converted[slope])
-        lines.append(f"{slope}: {format_list(slopes, ', ')}{f' {units}' * (units != '1')}")
+        lines.append(
+            f"{slope}: {format_abbreviated_list(slopes, ', ')}{f' {units}' * (units != '1')}"
+        )
     return [*lines, format_status_counts(dataset)]

@@ -8,7 +8,7 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.formatting import format_count_with_noun, format_nonempty_fields
+from rsfstudy.formatting import format_count_with_noun, format_fields_except_none
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reporting.cell_tables import format_status_counts
 from rsfstudy.reporting.fit_tables import scene_fields_set_by_fit
@@ -18,10 +18,10 @@ from rsfstudy.storage import StoredDataset
 
 
 def describe_scene_and_rig_fields(
-    heading: str,
+    nonzero_fields_heading: str,
     scene_fields: Mapping[str, Any],
-    rig_values: Mapping[str, float],
-    varied_names: Collection[str] = (),
+    rig_quantities: Mapping[str, float],
+    varied_field_names: Collection[str] = (),
 ) -> dict[str, str]:
     """Describe the fields of a scene and the quantities of a rig.
 
@@ -42,14 +42,16 @@ def describe_scene_and_rig_fields(
         Descriptions of the nonzero fields, of the fields that are zero, of the rig, and of the slip
         rate at the instability norm. Empty descriptions are omitted.
     """
-    scene_fields = {n: v for n, v in scene_fields.items() if n not in varied_names}
-    sizes = Rig.convert_quantities_for_display(rig_values, varied_names)
+    scene_fields = {n: v for n, v in scene_fields.items() if n not in varied_field_names}
+    sizes = Rig.convert_quantities_for_display(rig_quantities, varied_field_names)
     told = {
-        heading: format_nonempty_fields({n: v for n, v in scene_fields.items() if v}),
+        nonzero_fields_heading: format_fields_except_none(
+            {n: v for n, v in scene_fields.items() if v}
+        ),
         "fields with the value 0": ", ".join(
             n for n, v in scene_fields.items() if not v and v is not None
         ),
-        "rig": format_nonempty_fields({n: f"{v:g} {units}" for n, (v, units) in sizes.items()}),
+        "rig": format_fields_except_none({n: f"{v:g} {units}" for n, (v, units) in sizes.items()}),
     }
     norm, period = scene_fields.get("instability_norm"), scene_fields.get("period")
     if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):

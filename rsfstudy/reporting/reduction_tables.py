@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.formatting import format_value
+from rsfstudy.formatting import format_number_or_text
 from rsfstudy.reporting.text_tables import (
     TextTable,
     TextTableColumn,
@@ -79,7 +79,7 @@ def _build_slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
     slope = dataset[reduction_name]
     units, description = format_units(slope), slope.attrs.get("comment", reduction_name)
     heading = f"{reduction_name} ({units})" if units != "1" else reduction_name
-    columns = [TextTableColumn(heading, reduction_name, format_value, "value")]
+    columns = [TextTableColumn(heading, reduction_name, format_number_or_text, "value")]
     for suffix, (heading, form) in _SLOPE_TABLE_COLUMN_BY_SUFFIX.items():
         if (name := f"{reduction_name}_{suffix}") in dataset:
             if suffix != "points" and (own := format_units(dataset[name])) != units:
@@ -192,7 +192,7 @@ def format_missing_results(dataset: xr.Dataset, reasons: Mapping[str, str]) -> d
 def _format_point(values: xr.DataArray, indices: Sequence[int]) -> str:
     """Format the coordinates that locate a value in an array."""
     point = values.isel(dict(zip(values.dims, indices, strict=True)))
-    return ", ".join(f"{d} = {format_value(point[d].item())}" for d in values.dims)
+    return ", ".join(f"{d} = {format_number_or_text(point[d].item())}" for d in values.dims)
 
 
 def find_reasons_of_missing_reductions(dataset: xr.Dataset) -> dict[str, str]:
@@ -212,7 +212,7 @@ def find_reasons_of_missing_reductions(dataset: xr.Dataset) -> dict[str, str]:
     for stated_as in StoredDataset(dataset).declaration.reductions:
         about: Mapping[str, Any] = {**stated_as}
         if not any(name.startswith(about["name"]) for name in there):
-            least, most = map(format_value, about.get("within") or ("", ""))
+            least, most = map(format_number_or_text, about.get("within") or ("", ""))
             on = format_axis_name(dataset[about["on"]]) if most else ""
             span = f", with {least} <= {on} <= {most}" if most else ""
             found[about["name"]] = f"too few suitable cells{span}"

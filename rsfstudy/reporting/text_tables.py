@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from rsfstudy.formatting import format_value, read_flag_meanings
-from rsfstudy.quantities import read_units_or_scale
+from rsfstudy.formatting import format_number_or_text, read_flag_meanings
+from rsfstudy.quantities import read_units_or_reference_scale
 from rsfstudy.vocabulary import find_quantity
 
 #: Maximum number of cells in a table that shows a selection of cells.
-MAX_CELLS_IN_THINNED_TABLE = 24
+MAX_ROWS_IN_THINNED_TABLE = 24
 #: Maximum number of significant digits of a float.
 _MAX_SIGNIFICANT_DIGITS = 15
 
@@ -42,7 +42,7 @@ class TextTable:
     rows: Sequence[Mapping[str, str]]
     caption: str = ""
     wrappable_columns: Collection[str] = ()
-    last_cell_colours: Sequence[str] = ()
+    last_column_colours: Sequence[str] = ()
     unformatted_rows: Sequence[Mapping[str, Any]] = ()
 
 
@@ -65,7 +65,7 @@ class TextTableColumn(NamedTuple):
     heading: str
     variable_name: str
     format_function: Callable[[Any], str]
-    unformatted_key: str = ""
+    key_in_unformatted_rows: str = ""
 
 
 def format_number_or_dash(value: float, format_specification: str = ".8g") -> str:
@@ -156,7 +156,9 @@ def format_units(variable: xr.DataArray) -> str:
         Units of the variable, or the scale by which the variable was divided. The string is "1" if
         the variable is a pure number.
     """
-    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", read_units_or_scale(variable.attrs) or "1")
+    units = re.sub(
+        r" (s|[num]?m)-1\b", r"/\1", read_units_or_reference_scale(variable.attrs) or "1"
+    )
     return re.sub(r" \((\w+)\)-1| (\(.*?\))-1", r"/\1\2", units)
 
 
@@ -209,24 +211,26 @@ def build_table_along_dimensions(
     """
     dims, rows, values = list(map(str, dimensions)), [], []
     flags = {
-        column.unformatted_key: read_flag_meanings(dataset[column.variable_name].attrs)
+        column.key_in_unformatted_rows: read_flag_meanings(dataset[column.variable_name].attrs)
         for column in columns
     }
     for at in np.ndindex(*(dataset.sizes[d] for d in dims)):
         one = dataset.isel(dict(zip(dims, at, strict=True)))
         cells = {column: one[column.variable_name].item() for column in columns}
         rows.append(
-            {format_axis_name(one[d]): format_value(one[d].item()) for d in dims}
+            {format_axis_name(one[d]): format_number_or_text(one[d].item()) for d in dims}
             | {column.heading: column.format_function(value) for column, value in cells.items()}
         )
         fields = {
             column.variable_name: value
             for column, value in cells.items()
-            if not column.unformatted_key
+            if not column.key_in_unformatted_rows
         }
         found: dict[str, Any] = {"coordinates": {d: one[d].item() for d in dims} | fields}
         for column, value in cells.items():
-            if column.unformatted_key:
-                found[column.unformatted_key] = flags[column.unformatted_key].get(value, value)
+            if column.key_in_unformatted_rows:
+                found[column.key_in_unformatted_rows] = flags[column.key_in_unformatted_rows].get(
+                    value, value
+                )
         values.append(found)
     return TextTable(rows, caption, wrappable_columns, unformatted_rows=values)

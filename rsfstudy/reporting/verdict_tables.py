@@ -38,7 +38,7 @@ def build_claims_table(verdicts: pd.DataFrame) -> TextTable | str:
     return TextTable(
         [format_verdict_row_for_report(row) for row in rows],
         wrappable_columns={"claim", "tolerance and reason"},
-        last_cell_colours=colours,
+        last_column_colours=colours,
     )
 
 

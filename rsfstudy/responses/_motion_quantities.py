@@ -38,7 +38,7 @@ def compute_distance_from_steady_sliding(
         steady sliding. The second number is the difference between the state and its value in
         steady sliding, in units of b.
     """
-    size = scene.a * scene.parts.law.state_change_over_a
+    size = scene.a * scene.parts.law.state_change_per_log_rate_over_a
     return max(
         abs(point.log_slip_rate - math.log(abs(load_velocity))),
         point.distance_from_steady_state / size,
@@ -101,7 +101,7 @@ def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
         Friction coefficient minus the quantity.
     """
     parts = scene.parts
-    stressed = parts.normal_stress.normal_stress is not None or scene.stress_loading.unknowns
+    stressed = parts.normal_stress.normal_stress is not None or scene.stress_imposing_part.unknowns
     if not stressed and not parts.law.regularised:
         return "spring_stress", scene.mu_star
     return "apparent_friction", 0.0

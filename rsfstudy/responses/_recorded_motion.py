@@ -13,8 +13,8 @@ from rsfstudy.motion import (
     EventKind,
     EventSpecification,
     Integrator,
+    MotionRecorder,
     MotionStopped,
-    Recording,
     estimate_neglected_inertia_error,
 )
 from rsfstudy.slider import Scene
@@ -55,7 +55,7 @@ class RecordedMotion(NamedTuple):
     segment_start_events: list[Event]
     friction_before_segments: list[float]
     peak_event: Event | None
-    last_event: Event
+    end_event: Event
     recorded_rows: np.ndarray
     neglected_inertia_error: np.ndarray
 
@@ -85,8 +85,8 @@ def record_motion_until_peak(
     scene: Scene,
     integrator: Integrator,
     event_specs: Sequence[EventSpecification],
-    first_segment: int,
-    peak_segment: int,
+    first_segment_index: int,
+    peak_segment_index: int,
     *,
     end_time: float = math.inf,
     allow_early_stop: bool = False,
@@ -123,7 +123,7 @@ def record_motion_until_peak(
     MotionStopped
         If the motion cannot continue.
     """
-    recording, begun, peak = Recording(), list[Event](), None
+    recording, begun, peak = MotionRecorder(), list[Event](), None
     try:
         for event in integrator.follow(
             scene,
@@ -136,27 +136,30 @@ def record_motion_until_peak(
                 begun.append(event)
             elif (
                 event.specification == event_specs[0]
-                and len(begun) == peak_segment + 1
+                and len(begun) == peak_segment_index + 1
                 and peak is None
             ):
                 peak = event
-            if end_time == math.inf and (peak is not None or len(begun) > peak_segment + 1):
+            if end_time == math.inf and (peak is not None or len(begun) > peak_segment_index + 1):
                 break
     except MotionStopped:
         if peak is None or not allow_early_stop:
             raise
     rows, start = recording.as_table(scene), Integrator.point_before_start(scene)
-    slow = recording.get_or_add_regime_index(scene.dynamics.regime)
+    slow = recording.get_or_add_regime_index(scene.dynamics.regime_name)
     neglected = estimate_neglected_inertia_error(scene, rows, slow, start.log_slip_rate)
-    shown = rows[:, 0] >= begun[first_segment].time
+    shown = rows[:, 0] >= begun[first_segment_index].time
     rows, neglected = rows[shown], neglected[shown]
     # The other samples of the step that ends at the first row are not part of the record.
-    rows[0, Recording.SAMPLE_NUMBER_COLUMN] = 0.0
-    friction, later = Recording.get_friction_coefficient(rows), begun[max(first_segment, 1) :]
+    rows[0, MotionRecorder.SAMPLE_NUMBER_COLUMN] = 0.0
+    friction, later = (
+        MotionRecorder.get_friction_coefficient(rows),
+        begun[max(first_segment_index, 1) :],
+    )
     before = [float(friction[rows[:, 0] == each.time][0]) for each in later]
-    if first_segment == 0:
+    if first_segment_index == 0:
         before.insert(0, start.apparent_friction)
-    return RecordedMotion(begun[first_segment:], before, peak, event, rows, neglected)
+    return RecordedMotion(begun[first_segment_index:], before, peak, event, rows, neglected)
 
 
 def compute_path_relative_to_start(
@@ -278,7 +281,7 @@ def estimate_errors_at_instants(
     }
 
 
-def compute_settled_friction_flag(scene: Scene, *, is_flat: bool) -> float:
+def compute_settled_friction_flag(scene: Scene, *, is_friction_constant: bool) -> float:
     """Return 1 if friction has settled at the end of a record, and 0 if not.
 
     Friction has settled if it is nearly constant and if small perturbations of steady sliding do
@@ -296,7 +299,7 @@ def compute_settled_friction_flag(scene: Scene, *, is_flat: bool) -> float:
     float
         1, 0, or NaN if the growth rate of small perturbations is zero within its error.
     """
-    if not is_flat:
+    if not is_friction_constant:
         return 0.0
     growth = scene.largest_linear_growth_rate(scene.log_load_velocity)
     if growth is not None and growth.is_zero_within_error:

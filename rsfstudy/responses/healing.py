@@ -22,8 +22,8 @@ from rsfstudy.motion import (
     Event,
     EventKind,
     Integrator,
+    MotionRecorder,
     MotionStopped,
-    Recording,
     approach_to_steady_state,
     maximum,
     resample_motion_along_path,
@@ -55,14 +55,14 @@ _MAX_SPURIOUS_PEAK_OVER_LOCAL_TOLERANCE = 3.0
 #: fraction of the largest distance from steady sliding during the motion.
 _SETTLED_DISTANCE_OVER_MAX_DISTANCE = 1e-6
 
-_PEAK_DISPLACEMENT_MEANING = "load point displacement from reloading to the peak of friction"
-_HEALING_MEANING = "healing: peak friction on reloading minus friction before the hold"
-_RELAXATION_MEANING = "friction at the end of the hold minus friction before the hold"
+_PEAK_DISPLACEMENT_LONG_NAME = "load point displacement from reloading to the peak of friction"
+_HEALING_LONG_NAME = "healing: peak friction on reloading minus friction before the hold"
+_RELAXATION_LONG_NAME = "friction at the end of the hold minus friction before the hold"
 _HEALING_OUTPUTS = (
-    Output("healing", r"$\Delta\mu$", "1", _HEALING_MEANING, error=True),
-    Output("relaxation", r"$\Delta\mu_c$", "1", _RELAXATION_MEANING, error=True),
+    Output("healing", r"$\Delta\mu$", "1", _HEALING_LONG_NAME, error=True),
+    Output("relaxation", r"$\Delta\mu_c$", "1", _RELAXATION_LONG_NAME, error=True),
     Output(
-        "peak_displacement", r"$\delta_0/D_c$", "1", _PEAK_DISPLACEMENT_MEANING, "D_c", error=True
+        "peak_displacement", r"$\delta_0/D_c$", "1", _PEAK_DISPLACEMENT_LONG_NAME, "D_c", error=True
     ),
     *create_outputs_along_phase(
         "time", "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"
@@ -181,7 +181,7 @@ class Healing(RecordingMeasure):
             Status, results and message.
         """
         check_loading_has_no_noise(scene)
-        hold = _find_first_hold_segment(scene)
+        hold = _find_first_hold_segment_index(scene)
         first = _record_hold_and_reloading(scene, hold, integrator)
         said = _describe_unsteady_start_of_hold(
             scene,
@@ -195,7 +195,7 @@ class Healing(RecordingMeasure):
             "; ".join(filter(None, ("friction has no peak on reloading", said))),
         )
         if first.peak_event is None:
-            if first.last_event.kind is EventKind.SETTLED:
+            if first.end_event.kind is EventKind.SETTLED:
                 # The call raises MotionStopped if the stability is undecided.
                 is_steady_sliding_linearly_stable(scene)
             return peakless
@@ -233,7 +233,7 @@ class Healing(RecordingMeasure):
             values, refined, by_friction, scene, integrator, neglected
         )
         above = again.peak_event.point.apparent_friction - float(
-            Recording.get_friction_coefficient(again.recorded_rows)[-1]
+            MotionRecorder.get_friction_coefficient(again.recorded_rows)[-1]
         )
         # Near steady sliding, friction may have spurious peaks on which both runs agree.
         if above <= max(
@@ -258,20 +258,22 @@ class Healing(RecordingMeasure):
         )
 
     def _compute_outputs_along_record(
-        self, scene: Scene, record: RecordedMotion
+        self, scene: Scene, recorded_motion: RecordedMotion
     ) -> dict[str, np.ndarray]:
         """Return the quantities recorded since the beginning of the hold, by phase."""
         path = resample_motion_along_path(
-            record.recorded_rows, self.phases, Recording.VARIABLE_NAMES
+            recorded_motion.recorded_rows, self.phases, MotionRecorder.VARIABLE_NAMES
         )
-        moved = Recording.compute_load_point_displacement(scene, np.column_stack([*path.values()]))
+        moved = MotionRecorder.compute_load_point_displacement(
+            scene, np.column_stack([*path.values()])
+        )
         return {
-            **compute_path_relative_to_start(record.start_event, path),
+            **compute_path_relative_to_start(recorded_motion.start_event, path),
             "load_point_displacement": moved - moved[0],
         }
 
 
-def _find_first_hold_segment(scene: Scene) -> int:
+def _find_first_hold_segment_index(scene: Scene) -> int:
     """Return the index of the first loading segment with a held load point.
 
     Raises

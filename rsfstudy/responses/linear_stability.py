@@ -201,7 +201,7 @@ class LinearStability(Measure):
         Outcome
             Status, results and message.
         """
-        scene = scene.under_steady_loading
+        scene = scene.steadily_loaded_scene
         load = scene.log_load_velocity
         if load == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
@@ -243,7 +243,7 @@ class LinearStability(Measure):
         relative = critical / at_reference if at_reference else math.inf
         rise = critical / massless - 1.0 if massless else math.inf
         if rise > _MAX_CRITICAL_STIFFNESS_RISE_BY_INERTIA:
-            norm = scene.dynamics.slip_rate_norm(scene, load)
+            norm = scene.dynamics.compute_slip_rate_norm(scene, load)
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STIFFNESS,
                 values,

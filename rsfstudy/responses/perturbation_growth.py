@@ -23,7 +23,7 @@ _FINITE_DIFFERENCE_STEP_OVER_SCALE = 1e-4
 #: motion. At lower slip rates, the effect of inertia is smaller than the rounding errors of the
 #: inertial equations of motion. At lower slip rates, the slow manifold, which is of second order in
 #: the mass, is accurate enough.
-_MIN_RATE_NORM_FOR_INERTIAL_EQUATIONS = 1e-3
+_MIN_SLIP_RATE_NORM_FOR_INERTIA = 1e-3
 #: Growth rates from the friction relation and from the equations of motion disagree if their
 #: relative difference exceeds the first number. The second number is the smallest growth rate, per
 #: unit slip in D_c, to which the difference is compared. The Jacobian has a relative error of 1e-8.
@@ -55,8 +55,8 @@ GROWTH_OUTPUTS = (
 
 def _needs_full_equations(scene: Scene, steady_state: SteadySliding) -> bool:
     """Return True if the slow manifold is too inaccurate at the given slip rate."""
-    norm = scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
-    return bool(norm > _MIN_RATE_NORM_FOR_INERTIAL_EQUATIONS)
+    norm = scene.dynamics.compute_slip_rate_norm(scene, steady_state.log_slip_rate)
+    return bool(norm > _MIN_SLIP_RATE_NORM_FOR_INERTIA)
 
 
 def compute_jacobian_of_steady_sliding(
@@ -122,7 +122,7 @@ def add_growth_rate(
     # In steady sliding, the displacement is the sum of two equal displacements: the slip and the
     # load point displacement.
     found = found * (
-        1.0 / scene.dynamics.slip_rate_norm(scene, load)
+        1.0 / scene.dynamics.compute_slip_rate_norm(scene, load)
         if _needs_full_equations(scene, steady_state)
         else 2.0
     )

@@ -12,7 +12,7 @@ import numpy as np
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome, check_loading_has_no_noise
-from rsfstudy.motion import EventKind, Integrator, MotionStopped, Recording, fall, rise
+from rsfstudy.motion import EventKind, Integrator, MotionRecorder, MotionStopped, fall, rise
 from rsfstudy.quantities import Output
 from rsfstudy.responses._recorded_motion import estimate_error_at_instant
 from rsfstudy.slider import Scene
@@ -245,7 +245,7 @@ class RigidResponse(Measure):
             Stress, state variable and normal stress ratio at the points.
         """
         at, distance = self.inner_coordinates["slip"], math.nan
-        recording = Recording(sample_times=np.union1d(at, [1.0]))
+        recording = MotionRecorder(sample_times=np.union1d(at, [1.0]))
         equations = scene.equations_at_imposed_slip_rate(scene.log_load_velocity)
         watches = (rise("frictional_stress", stress_level), fall("frictional_stress", stress_level))
         # The step does not change the states Psi, which have their values of steady sliding at V_*.
@@ -258,7 +258,7 @@ class RigidResponse(Measure):
             if complete and not math.isnan(distance):
                 break
         names = ("slip", "frictional_stress", "state_variable", "normal_stress_ratio")
-        columns = [Recording.VARIABLE_NAMES.index(name) for name in names]
+        columns = [MotionRecorder.VARIABLE_NAMES.index(name) for name in names]
         slips, *values = recording.as_table(scene)[:, columns].T
         values[0] = values[0] - scene.mu_star
         rows = np.stack(values, axis=1)

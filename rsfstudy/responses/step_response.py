@@ -22,8 +22,8 @@ from rsfstudy.motion import (
     Event,
     EventKind,
     Integrator,
+    MotionRecorder,
     MotionStopped,
-    Recording,
     approach_to_steady_state,
     maximum,
     resample_motion_along_path,
@@ -47,7 +47,7 @@ _STEP_RESPONSE_OUTPUTS = (
         "repeats itself",
     ),
     Output("peak_log10_slip_rate", dims=("peak",)),
-    *create_outputs_along_phase(*Recording.MOTION_VARIABLE_NAMES),
+    *create_outputs_along_phase(*MotionRecorder.MOTION_VARIABLE_NAMES),
 )
 
 
@@ -196,7 +196,7 @@ class StepResponse(RecordingMeasure):
         """Integrate the motion, and return its peaks and the record."""
         peaks: list[float] = []
         recording, asked = (
-            Recording(),
+            MotionRecorder(),
             (
                 maximum("log_slip_rate"),
                 approach_to_steady_state(_SETTLED_DISTANCE_OVER_MAX_DISTANCE),

@@ -20,8 +20,8 @@ from rsfstudy.measure_base import (
 from rsfstudy.motion import (
     Event,
     Integrator,
+    MotionRecorder,
     MotionStopped,
-    Recording,
     fall,
     maximum,
     minimum,
@@ -277,7 +277,7 @@ class VelocityStep(RecordingMeasure):
         (record, values), (_again, again) = records
         slopes = self._compute_output_derivatives_by_friction(step.log_velocity_ratio, values)
         neglected = dict.fromkeys(
-            slopes, record.get_neglected_inertia_error_until(record.last_event.time)
+            slopes, record.get_neglected_inertia_error_until(record.end_event.time)
         )
         errors = estimate_errors_at_instants(values, again, slopes, scene, integrator, neglected)
         found = {**values, **errors, **self._compute_outputs_along_record(scene, step, record)}
@@ -339,7 +339,7 @@ class VelocityStep(RecordingMeasure):
         """
         before, after = (
             recorded_motion.friction_before_segments[0],
-            recorded_motion.last_event.point.apparent_friction,
+            recorded_motion.end_event.point.apparent_friction,
         )
         top = (
             recorded_motion.peak_event.point.apparent_friction
@@ -374,15 +374,15 @@ class VelocityStep(RecordingMeasure):
         step.
         """
         peak = recorded_motion.peak_event
-        if peak is None or not peak.time < recorded_motion.last_event.time:
+        if peak is None or not peak.time < recorded_motion.end_event.time:
             return None
-        after, top = (e.point.apparent_friction for e in (recorded_motion.last_event, peak))
+        after, top = (e.point.apparent_friction for e in (recorded_motion.end_event, peak))
         of, above = choose_friction_quantity_for_events(scene)
         level = after + (top - after) / math.e - above
         # If a state strengthens friction, the evolution may have the sign of the direct effect.
         watch = fall(of, level, terminal=True) if top > after else rise(of, level, terminal=True)
         stepped = scene.segment_scene(self.step_number - 1)
-        rest = recorded_motion.last_event.time - peak.time
+        rest = recorded_motion.end_event.time - peak.time
         events = integrator.follow(stepped, [watch], start=peak.point, until=rest)
         return next((event for event in events if event.specification == watch), None)
 
@@ -392,21 +392,21 @@ class VelocityStep(RecordingMeasure):
         """Return the record, ``settled`` and the closed-form departure."""
         rows, friction = (
             recorded_motion.recorded_rows,
-            Recording.get_friction_coefficient(recorded_motion.recorded_rows),
+            MotionRecorder.get_friction_coefficient(recorded_motion.recorded_rows),
         )
-        late = recorded_motion.last_event.time - _SETTLING_WINDOW_FRACTION * evaluated_step.duration
+        late = recorded_motion.end_event.time - _SETTLING_WINDOW_FRACTION * evaluated_step.duration
         # The last tenth of the record may contain few samples, because time steps may be long.
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
-        turned = recorded_motion.peak_event or recorded_motion.last_event
+        turned = recorded_motion.peak_event or recorded_motion.end_event
         direct = turned.point.apparent_friction - recorded_motion.friction_before_segments[0]
         path = compute_path_relative_to_start(
             recorded_motion.start_event,
-            resample_motion_along_path(rows, self.phases, Recording.VARIABLE_NAMES),
+            resample_motion_along_path(rows, self.phases, MotionRecorder.VARIABLE_NAMES),
         )
         stepped = scene.segment_scene(self.step_number - 1)
         is_flat = bool(np.ptp(last) < _SETTLING_TOLERANCE * abs(direct))
         return {
-            "settled": compute_settled_friction_flag(stepped, is_flat=is_flat),
+            "settled": compute_settled_friction_flag(stepped, is_friction_constant=is_flat),
             "closed_form_departure": _compute_max_departure_from_closed_form(
                 scene, evaluated_step, recorded_motion
             ),
@@ -438,7 +438,7 @@ def _compute_max_departure_from_closed_form(
         before
     )
     steady += scene.dynamics.radiated_stress(after) - scene.dynamics.radiated_stress(before)
-    slip = recorded_motion.recorded_rows[:, Recording.MOTION_VARIABLE_NAMES.index("slip")]
+    slip = recorded_motion.recorded_rows[:, MotionRecorder.MOTION_VARIABLE_NAMES.index("slip")]
     later = recorded_motion.recorded_rows[:, 0] >= recorded_motion.peak_event.time
     left = np.array(
         [
@@ -448,7 +448,7 @@ def _compute_max_departure_from_closed_form(
     )
     expected = steady + scene.b * left
     seen = (
-        Recording.get_friction_coefficient(recorded_motion.recorded_rows)
+        MotionRecorder.get_friction_coefficient(recorded_motion.recorded_rows)
         - recorded_motion.friction_before_segments[0]
     )[later]
     return float(np.abs(seen - expected).max())
@@ -467,7 +467,7 @@ def _is_closed_form_applicable(
     stress_acts = stress.normal_stress or stress.state_effect or law.depends_on_stress
     if stress_acts or stress.effects or fluid.unknowns or scene.parts.temperature.unknowns:
         return False
-    if not law.scale_free and evaluated_step.velocity_before != 1.0:
+    if not law.lacks_characteristic_slip_rate and evaluated_step.velocity_before != 1.0:
         return False
     return compute_distance_from_steady_sliding(
         scene, recorded_motion.start_event.point, evaluated_step.velocity_before

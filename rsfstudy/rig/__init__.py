@@ -13,16 +13,20 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.rig.column_reading import ColumnsReadFromSource, ReadingOptions, read_columns
+    from rsfstudy.rig.column_reading import (
+        ColumnsReadFromSource,
+        RecordReadingOptions,
+        read_columns,
+    )
     from rsfstudy.rig.columns import Column
-    from rsfstudy.rig.common_headings import UsableColumns, has_time_column
+    from rsfstudy.rig.common_headings import AcceptedRecordColumns, has_time_column
     from rsfstudy.rig.dataset_units import DatasetUnits
     from rsfstudy.rig.number_ranges import expand_range
     from rsfstudy.rig.protocol_files import read_protocol
     from rsfstudy.rig.record_files import read_record
     from rsfstudy.rig.rig import Rig
     from rsfstudy.rig.rig_scenes import (
-        LatticeScenesOnRig,
+        RigAxesToScenesConverter,
     )
     from rsfstudy.rig.rig_study_axes import RigAxes
     from rsfstudy.rig.table_files import read_table
@@ -68,10 +72,10 @@ __all__ = [
     "RigAxes",
     "Column",
     "ColumnsReadFromSource",
-    "ReadingOptions",
+    "RecordReadingOptions",
     "Rig",
-    "UsableColumns",
-    "LatticeScenesOnRig",
+    "AcceptedRecordColumns",
+    "RigAxesToScenesConverter",
     "convert_to_si",
     "expand_range",
     "has_time_column",

@@ -20,8 +20,8 @@ from rsfstudy.rig.rig_quantities import (
     RIG_QUANTITIES,
     RIG_QUANTITY_BY_AXIS_NAME,
     SI_UNIT_BY_SCALE,
-    find_si_units_of_field,
-    is_stiffness_over_normal_stress,
+    find_si_units_of_scene_field,
+    is_stiffness_in_friction_per_length,
 )
 from rsfstudy.rig.units import (
     compute_conversion_factor,
@@ -73,9 +73,11 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
         if isinstance(values, Mapping) and any(
             isinstance(Axis.get_fields_of_point(point), Mapping) for point in values.values()
         ):
-            return convert_axis_to_stated_units(Axis(dimension, values))
+            return convert_axis_values_to_axis_units(Axis(dimension, values))
         stated: Any = units or None
-        return convert_axis_to_stated_units(Axis.cases(values, units=stated, dimension=dimension))
+        return convert_axis_values_to_axis_units(
+            Axis.cases(values, units=stated, dimension=dimension)
+        )
     assert isinstance(units, str)
     if isinstance(values, str) and ":" in values:
         values = expand_range(dimension, values, values)
@@ -85,7 +87,7 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
     return _create_single_field_axis([{dimension: value} for value in listed], {dimension: units})
 
 
-def convert_axis_to_stated_units(axis: Axis) -> Axis:
+def convert_axis_values_to_axis_units(axis: Axis) -> Axis:
     """Convert the values of an axis to the units of the axis.
 
     Parameters
@@ -101,35 +103,40 @@ def convert_axis_to_stated_units(axis: Axis) -> Axis:
     """
     if axis.varies_single_field:
         return _create_single_field_axis(axis.rows, axis.units)
-    rows, units = _convert_rows_to_axis_units(
+    rows, units = _convert_axis_rows_to_common_units(
         axis.rows, axis.units, first_value_sets_units=axis.has_numbered_points
     )
     return axis.with_rows(rows, units, axis.sampling_info)
 
 
 def _create_single_field_axis(
-    rows: Sequence[AxisPointFieldValues], units: Mapping[str, str]
+    axis_rows: Sequence[AxisPointFieldValues], units: Mapping[str, str]
 ) -> Axis:
     """Create an axis with units for a single field."""
-    found, stated = _convert_rows_to_axis_units(rows, units, first_value_sets_units=True)
+    found, stated = _convert_axis_rows_to_common_units(
+        axis_rows, units, first_value_sets_units=True
+    )
     (name,) = found[0]
     return Axis(name, [row[name] for row in found], stated)
 
 
-def _convert_rows_to_axis_units(
-    rows: Sequence[AxisPointFieldValues], units: Mapping[str, str], *, first_value_sets_units: bool
+def _convert_axis_rows_to_common_units(
+    axis_rows: Sequence[AxisPointFieldValues],
+    units: Mapping[str, str],
+    *,
+    first_value_sets_units: bool,
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """Convert the rows of an axis to numbers and return their units.
 
     The function converts field names to their names on axes. The units of a field are, in order of
     priority, the units of the axis, the units of the first value of the column, or SI units.
     """
-    found: list[dict[str, Any]] = [{} for _row in rows]
+    found: list[dict[str, Any]] = [{} for _row in axis_rows]
     stated: dict[str, str] = {}
     quantities: dict[str, list[tuple[dict[str, Any], Any]]] = {}
-    for row, new in zip(rows, found, strict=True):
+    for row, new in zip(axis_rows, found, strict=True):
         for given, value in row.items():
-            example = rows[0][given] if first_value_sets_units else value
+            example = axis_rows[0][given] if first_value_sets_units else value
             name, si = find_axis_name_and_si_units(given, example)
             new[name if si else given] = value
             if si:
@@ -171,8 +178,8 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     scale, found = compute_factor_to_si(quantity_name, units), []
     kind = (
         "1/m"
-        if quantity_name == "stiffness" and is_stiffness_over_normal_stress(f"1 {units}")
-        else _find_axis_si_units(quantity_name, "1")
+        if quantity_name == "stiffness" and is_stiffness_in_friction_per_length(f"1 {units}")
+        else _find_si_units_of_axis_value(quantity_name, "1")
     )
     for value in values:
         number, written = (
@@ -187,7 +194,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     wrong = [
         value
         for number, value in zip(found, values, strict=True)
-        if not _is_positive_if_rig_quantity(quantity_name, number)
+        if not _is_positive_or_not_rig_quantity(quantity_name, number)
     ]
     if wrong:
         of = f", but {len(wrong)} of {len(found)} values are not" if len(found) > 1 else ""
@@ -195,14 +202,14 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     return found
 
 
-def _is_positive_if_rig_quantity(quantity_name: str, number: Any) -> bool:
+def _is_positive_or_not_rig_quantity(quantity_name: str, number: Any) -> bool:
     """Return False if a quantity that must be positive is not positive."""
     return quantity_name not in RIG_QUANTITY_BY_AXIS_NAME or (
         isinstance(number, float) and number > 0.0
     )
 
 
-def find_axis_name_and_si_units(name: str, value: Any) -> tuple[str, str | None]:
+def find_axis_name_and_si_units(field_name: str, value: Any) -> tuple[str, str | None]:
     """Return the axis name and the SI units of a quantity or field.
 
     Parameters
@@ -219,35 +226,35 @@ def find_axis_name_and_si_units(name: str, value: Any) -> tuple[str, str | None]
     units : str or None
         SI units, or None if the value has no units.
     """
-    name = _find_axis_name(name, value)
-    return name, _find_axis_si_units(name, value)
+    field_name = _find_axis_name_of_field(field_name, value)
+    return field_name, _find_si_units_of_axis_value(field_name, value)
 
 
-def _find_axis_name(name: str, value: Any) -> str:
+def _find_axis_name_of_field(field_name: str, value: Any) -> str:
     """Return the name of the axis that varies a rig quantity or scene field."""
     quantity = not isinstance(value, str) or split_number_and_units(value)[0] is not None
-    if name in AXIS_NAME_BY_RIG_QUANTITY and quantity:
-        return AXIS_NAME_BY_RIG_QUANTITY[name]
-    if not is_valid_variable_name(name):
-        return name  # The scene raises an error later.
-    short = name.removesuffix("_ratio")
+    if field_name in AXIS_NAME_BY_RIG_QUANTITY and quantity:
+        return AXIS_NAME_BY_RIG_QUANTITY[field_name]
+    if not is_valid_variable_name(field_name):
+        return field_name  # The scene raises an error later.
+    short = field_name.removesuffix("_ratio")
     return (
         short
-        if RATIO_FIELD_BY_DIMENSIONAL_NAME.get(short) == name
-        and find_si_units_of_field(name, value)
-        else name
+        if RATIO_FIELD_BY_DIMENSIONAL_NAME.get(short) == field_name
+        and find_si_units_of_scene_field(field_name, value)
+        else field_name
     )
 
 
-def _find_axis_si_units(name: str, value: Any) -> str | None:
+def _find_si_units_of_axis_value(field_name: str, value: Any) -> str | None:
     """Return the SI units of an axis value, or None if it has no units."""
     if value is None or isinstance(value, bool):
         return None
-    if name in RIG_QUANTITY_BY_AXIS_NAME:
-        return RIG_QUANTITIES[RIG_QUANTITY_BY_AXIS_NAME[name]].si_units
-    if name in RATIO_FIELD_BY_DIMENSIONAL_NAME:
+    if field_name in RIG_QUANTITY_BY_AXIS_NAME:
+        return RIG_QUANTITIES[RIG_QUANTITY_BY_AXIS_NAME[field_name]].si_units
+    if field_name in RATIO_FIELD_BY_DIMENSIONAL_NAME:
         return SI_UNIT_BY_SCALE["V_*"]
-    return find_si_units_of_field(name, value)
+    return find_si_units_of_scene_field(field_name, value)
 
 
 def _parse_units_of_value(value: Any) -> str:
@@ -275,9 +282,9 @@ def compute_factor_to_si(quantity_name: str, units: str) -> Fraction:
     InvalidValue
         If the quantity has no units, or if the units are unknown or incompatible.
     """
-    if quantity_name == "stiffness" and is_stiffness_over_normal_stress(f"1 {units}"):
+    if quantity_name == "stiffness" and is_stiffness_in_friction_per_length(f"1 {units}"):
         return compute_conversion_factor(quantity_name, units, "1/m")
-    si = _find_axis_si_units(quantity_name, f"1 {units}")
+    si = _find_si_units_of_axis_value(quantity_name, f"1 {units}")
     if si is None:
         raise InvalidValue(quantity_name, units, "are not units of a rig quantity")
     return compute_conversion_factor(quantity_name, units, si)

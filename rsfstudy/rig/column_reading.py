@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 from rsfstudy.errors import CallError, InvalidValue, shorten_text
 from rsfstudy.rig.columns import Column
 from rsfstudy.rig.common_headings import (
-    UsableColumns,
+    AcceptedRecordColumns,
     check_column_values_are_finite,
-    read_selected_columns,
+    read_selected_and_detected_columns,
 )
 from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.table_sources import SourceTable
+from rsfstudy.rig.readers.table_sources import LazyTable
 from rsfstudy.rig.row_selection import RowSelection
 from rsfstudy.rig.units import (
     compute_conversion_factor,
@@ -34,7 +34,7 @@ _COLUMNS_THAT_MAY_CONTAIN_FORCES = ("shear_stress", "normal_stress")
 
 
 @dataclass(frozen=True)
-class ReadingOptions(RowSelection):
+class RecordReadingOptions(RowSelection):
     """Options shared by all functions that read records.
 
     The class `RowSelection` describes the options that are not listed here.
@@ -54,7 +54,7 @@ class ReadingOptions(RowSelection):
     area: Any = None
 
     @classmethod
-    def from_keywords(cls, function_name: str, keywords: Mapping[str, Any]) -> ReadingOptions:
+    def from_keywords(cls, function_name: str, keywords: Mapping[str, Any]) -> RecordReadingOptions:
         """Create the options from the keyword arguments of a function.
 
         Parameters
@@ -101,16 +101,16 @@ class ColumnsReadFromSource(NamedTuple):
         Descriptions of the row selection that was applied.
     """
 
-    columns: dict[str, Column]
-    table: SourceTable
+    columns_by_name: dict[str, Column]
+    source_table: LazyTable
     row_selection_descriptions: list[str]
 
 
 def read_columns(
     source: Any,
     selected_columns: Mapping[str, Any] | None,
-    usable_columns: UsableColumns,
-    reading_options: ReadingOptions,
+    accepted_columns: AcceptedRecordColumns,
+    reading_options: RecordReadingOptions,
 ) -> ColumnsReadFromSource:
     """Read those columns of a source that the calling function can use.
 
@@ -140,14 +140,14 @@ def read_columns(
     table = read_table_from_source(
         source, decimal_separator=reading_options.decimal, sheet_or_group_name=reading_options.sheet
     )
-    found = read_selected_columns(table, selected_columns, usable_columns)
+    found = read_selected_and_detected_columns(table, selected_columns, accepted_columns)
     found = {
         name: _convert_force_to_stress(name, column, reading_options.area)
         for name, column in found.items()
     }
     processing: list[str] = []
     if found:
-        found, processing = reading_options.keep_selected_rows(found)
+        found, processing = reading_options.keep_rows_between_limits(found)
     check_column_values_are_finite(found)
     return ColumnsReadFromSource(found, table, processing)
 

@@ -95,7 +95,7 @@ def check_heading_lengths(headings: Iterable[str], file_description: str) -> Non
             raise error.with_location(f"{file_description}, column {column}") from error
 
 
-def _parse_column_selection_sequence(column_choice: Any) -> ColumnSelection:
+def _parse_column_selection_tuple(column_choice: Any) -> ColumnSelection:
     """Parse a column selection with heading, units, scale and offset."""
     rule = "must be a heading, or a list with a heading, units, a scale and an offset"
     remedy = "Write, for example, ('Time (s)', 's', 0.001)."
@@ -141,7 +141,7 @@ def parse_column_selection(column_choice: Any, headings: Collection[str]) -> Col
         If the selection is neither a string nor a sequence, or if the heading is too long.
     """
     if not isinstance(column_choice, str):
-        return _parse_column_selection_sequence(column_choice)
+        return _parse_column_selection_tuple(column_choice)
     check_heading_length(column_choice)
     raw = (
         None

@@ -14,11 +14,11 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSelection, parse_column_selection
 from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.table_sources import SourceTable
+from rsfstudy.rig.readers.table_sources import LazyTable
 from rsfstudy.rig.units import compute_conversion_factor
 
 #: SI units of the columns of a record, and factors from SI units to the units of `Record`.
-SI_UNITS_AND_FACTOR_BY_RECORD_COLUMN = {
+SI_UNITS_AND_FACTOR_FROM_SI_BY_COLUMN = {
     "time": ("s", 1.0),
     "displacement": ("m", 1e6),
     "slip": ("m", 1e6),
@@ -33,7 +33,7 @@ _EXAMPLE_UNITS_BY_COLUMN = {"time": "s", "displacement": "um", "slip": "um", "ve
 #: Spellings of the unit of dimensionless columns.
 _SPELLINGS_OF_DIMENSIONLESS_UNIT = ("1", "-", ".", "none")
 #: Columns that can replace a column, indexed by the name of the replaced column.
-_ALTERNATIVE_COLUMN_BY_COLUMN = {
+_SUBSTITUTE_COLUMN_BY_COLUMN_NAME = {
     "displacement": "slip",
     "slip": "displacement",
     "friction": "shear_stress",
@@ -52,7 +52,7 @@ _COMMON_HEADING_PATTERN_BY_COLUMN = {
 }
 
 
-class UsableColumns(NamedTuple):
+class AcceptedRecordColumns(NamedTuple):
     """Columns that are accepted by a function that reads records.
 
     Parameters
@@ -68,7 +68,7 @@ class UsableColumns(NamedTuple):
     """
 
     column_names: tuple[str, ...]
-    shear_stress_suffices: bool = False
+    skips_normal_stress_if_shear_stress: bool = False
 
 
 def compute_factor_to_record_units(column_name: str, units: str) -> float:
@@ -91,7 +91,7 @@ def compute_factor_to_record_units(column_name: str, units: str) -> float:
     InvalidValue
         If the units are not compatible with the column.
     """
-    si, ours = SI_UNITS_AND_FACTOR_BY_RECORD_COLUMN[column_name]
+    si, ours = SI_UNITS_AND_FACTOR_FROM_SI_BY_COLUMN[column_name]
     if not units:
         return {"Pa": 1e6}.get(si, 1.0)
     if si == "1" and units in _SPELLINGS_OF_DIMENSIONLESS_UNIT:
@@ -99,8 +99,10 @@ def compute_factor_to_record_units(column_name: str, units: str) -> float:
     return float(compute_conversion_factor(column_name, units, si)) * ours
 
 
-def read_selected_columns(
-    table: SourceTable, selected_columns: Mapping[str, Any] | None, usable_columns: UsableColumns
+def read_selected_and_detected_columns(
+    table: LazyTable,
+    selected_columns: Mapping[str, Any] | None,
+    accepted_columns: AcceptedRecordColumns,
 ) -> dict[str, Column]:
     """Read the selected columns, and usable columns with common headings.
 
@@ -126,21 +128,22 @@ def read_selected_columns(
         several columns match the same usable column, or if a column has no units.
     """
     for name in selected_columns or ():
-        _check_column_name_is_known(name, usable_columns.column_names)
+        _check_column_name_is_known(name, accepted_columns.column_names)
     if selected_columns is None and table.headings_are_column_names:
         for name in table.headings:
-            _check_column_name_is_known(name, usable_columns.column_names)
+            _check_column_name_is_known(name, accepted_columns.column_names)
         return {name: table.read_column(name, ColumnSelection(name)) for name in table.headings}
     found = dict(selected_columns or {})
     # If the user selects a column of friction or shear stress, the column of normal stress is used
     # only if the user selects it too.
     has_stress = not {"friction", "shear_stress"}.isdisjoint(found)
-    for name in usable_columns.column_names if table.has_headings else ():
+    for name in accepted_columns.column_names if table.has_headings else ():
         if name == "normal_stress" and (
-            has_stress or (usable_columns.shear_stress_suffices and "shear_stress" in found)
+            has_stress
+            or (accepted_columns.skips_normal_stress_if_shear_stress and "shear_stress" in found)
         ):
             continue
-        if name not in found and _ALTERNATIVE_COLUMN_BY_COLUMN.get(name) not in found:
+        if name not in found and _SUBSTITUTE_COLUMN_BY_COLUMN_NAME.get(name) not in found:
             found |= _find_column_with_common_heading(name, table)
     headings = dict.fromkeys(table.headings)
     return {
@@ -155,17 +158,17 @@ def _check_column_name_is_known(column_name: str, known_names: Sequence[str]) ->
 
 
 def _read_column_with_units(
-    table: SourceTable, column_name: str, selection: Any, headings: Mapping[str, Any]
+    table: LazyTable, column_name: str, column_selection: Any, headings: Mapping[str, Any]
 ) -> Column:
     """Read a column, and check that it has units.
 
     The units of friction may be omitted, but the units of other columns are required.
     """
-    spec = parse_column_selection(selection, headings)
+    spec = parse_column_selection(column_selection, headings)
     index = table.find_column_index(spec.heading)
     stated = spec.units or table.parse_units_of_heading(index)
-    if not (stated or table.uses_default_units or column_name == "friction") and isinstance(
-        selection, str
+    if not (stated or table.columns_have_no_units or column_name == "friction") and isinstance(
+        column_selection, str
     ):
         column = table.read_column(column_name, spec)
         if column.units:  # The type of the values implies the units.
@@ -176,7 +179,7 @@ def _read_column_with_units(
             f"Alternatively, pass --columns '{column_name}={whole},...' "
         )
         remedy += f"(columns={{'{column_name}': '{whole}', ...}})."
-        raise InvalidValue("heading", selection, "has no units", remedy=remedy)
+        raise InvalidValue("heading", column_selection, "has no units", remedy=remedy)
     return table.read_column(column_name, spec)
 
 
@@ -196,7 +199,7 @@ def has_time_column(source: Any) -> bool:
     return bool(_find_column_with_common_heading("time", read_table_from_source(source)))
 
 
-def _find_column_with_common_heading(column_name: str, table: SourceTable) -> dict[str, str]:
+def _find_column_with_common_heading(column_name: str, table: LazyTable) -> dict[str, str]:
     """Find the column with a common heading for a quantity.
 
     If several headings match, headings with compatible units take precedence. Among headings with
@@ -233,7 +236,7 @@ def _has_compatible_units(column_name: str, units: str) -> bool:
         return False
 
 
-def build_missing_columns_error(table: SourceTable, rule: str) -> InvalidValue:
+def build_missing_columns_error(table: LazyTable, rule: str) -> InvalidValue:
     """Return the error for a table without the required columns.
 
     Parameters

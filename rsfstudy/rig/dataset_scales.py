@@ -95,16 +95,20 @@ def read_si_scales(
     InvalidValue
         If a scale is missing, or if an argument contradicts the dataset.
     """
-    return build_si_scales(
-        _read_scale_or_use_argument(dataset, "sigma_star", "normal_stress", normal_stress, "Pa"),
-        _read_scale_or_use_argument(dataset, "slip_distance", "slip_distance", slip_distance, "m"),
-        _read_scale_or_use_argument(
+    return compute_si_scales(
+        _read_stored_scale_or_use_argument(
+            dataset, "sigma_star", "normal_stress", normal_stress, "Pa"
+        ),
+        _read_stored_scale_or_use_argument(
+            dataset, "slip_distance", "slip_distance", slip_distance, "m"
+        ),
+        _read_stored_scale_or_use_argument(
             dataset, "reference_rate", "reference_rate", reference_rate, "1/s"
         ),
     )
 
 
-def _read_scale_or_use_argument(
+def _read_stored_scale_or_use_argument(
     dataset: xr.Dataset,
     coordinate_name: str,
     argument_name: str,
@@ -141,7 +145,7 @@ def _read_scale_or_use_argument(
     return held
 
 
-def build_scales_of_rig(rig: Mapping[str, Any]) -> dict[str, UnitScale]:
+def compute_unit_scales_of_rig(rig: Mapping[str, Any]) -> dict[str, UnitScale]:
     """Compute the SI values of the dimensionless units of a rig.
 
     Parameters
@@ -155,7 +159,7 @@ def build_scales_of_rig(rig: Mapping[str, Any]) -> dict[str, UnitScale]:
         Scales by name. If the quantities are arrays, the factors are arrays.
     """
     rate = rig["reference_velocity"] / rig["slip_distance"]
-    return build_si_scales(rig["normal_stress"], rig["slip_distance"], rate)
+    return compute_si_scales(rig["normal_stress"], rig["slip_distance"], rate)
 
 
 def convert_dataset_units(
@@ -197,7 +201,7 @@ def convert_dataset_units(
     )
 
 
-def build_si_scales(
+def compute_si_scales(
     normal_stress: float | xr.Variable,
     slip_distance: float | xr.Variable,
     reference_rate: float | xr.Variable,
@@ -252,7 +256,7 @@ def _format_number_or_range(values: float | xr.Variable) -> str:
     return " to ".join(f"{end:g}" for end in ends)
 
 
-def find_scale_of_variable(
+def find_unit_scale_of_variable(
     variable: xr.DataArray | xr.Variable, scales_by_name: Mapping[str, UnitScale]
 ) -> UnitScale | None:
     """Find the physical value of the dimensionless unit of a variable.
@@ -300,7 +304,7 @@ def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
     return convert_dataset_units(dataset, read_si_scales(dataset), **DISPLAY_BASE_UNITS)
 
 
-def has_units_unexpected_by_its_figures(dataset: xr.Dataset) -> bool:
+def has_units_other_than_display_units(dataset: xr.Dataset) -> bool:
     """Return True if results do not have the units that study figures require.
 
     Parameters
@@ -354,7 +358,8 @@ def multiply_variables_by_unit_scales(
     beside = [
         n
         for n in map(str, dataset.coords)
-        if convert_to_dimensional_name(n) != n and convert_to_dimensional_name(n) in dataset
+        if convert_to_dimensional_variable_name(n) != n
+        and convert_to_dimensional_variable_name(n) in dataset
     ]
     dataset = dataset.drop_vars(beside)
     result = dataset.copy()
@@ -362,7 +367,7 @@ def multiply_variables_by_unit_scales(
     sizes = {
         n: scale
         for n, v in dataset.variables.items()
-        if (scale := find_scale_of_variable(v, scales_by_name))
+        if (scale := find_unit_scale_of_variable(v, scales_by_name))
     }
     if not sizes:
         text = (
@@ -389,8 +394,8 @@ def multiply_variables_by_unit_scales(
         words = dataset[name].attrs | {"units": scales_by_name[held[name]].units}
         result[name] = one.dims, one.values, words
     for name in logarithms:
-        result = result.assign(slip_rate_from_log(dataset, name, *scales_by_name["V_*"]))
-    new = {str(name): convert_to_dimensional_name(str(name)) for name in sizes}
+        result = result.assign(compute_slip_rate_from_log(dataset, name, *scales_by_name["V_*"]))
+    new = {str(name): convert_to_dimensional_variable_name(str(name)) for name in sizes}
     result = result.rename({old: name for old, name in new.items() if name != old})
     for variable in result.variables.values():
         named = str(variable.attrs.get("ancillary_variables", "")).split()
@@ -402,7 +407,7 @@ def multiply_variables_by_unit_scales(
     return copy_with_cf_encoding(result.assign_attrs({NAME_OF_SCALES_ATTRIBUTE: told}))
 
 
-def convert_to_dimensional_name(variable_name: str) -> str:
+def convert_to_dimensional_variable_name(variable_name: str) -> str:
     """Return the name of a variable after the conversion to physical units.
 
     Parameters
@@ -421,7 +426,7 @@ def convert_to_dimensional_name(variable_name: str) -> str:
     return variable_name
 
 
-def slip_rate_from_log(
+def compute_slip_rate_from_log(
     dataset: xr.Dataset, variable_name: str, factor: float | xr.Variable, units: str
 ) -> dict[str, xr.Variable]:
     """Compute slip rates from their decimal logarithms.

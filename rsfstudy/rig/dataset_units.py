@@ -27,7 +27,9 @@ class DatasetUnits:
     #: Prefix of the name of a dimensionless field if an axis in physical units has the same name.
     DIMENSIONLESS_PREFIX: ClassVar[str] = dataset_scales.DIMENSIONLESS_PREFIX
 
-    convert_to_dimensional_name = staticmethod(dataset_scales.convert_to_dimensional_name)
+    convert_to_dimensional_variable_name = staticmethod(
+        dataset_scales.convert_to_dimensional_variable_name
+    )
 
     def __init__(self, dataset: xr.Dataset) -> None:
         """Store a reference to the dataset."""
@@ -69,7 +71,7 @@ class DatasetUnits:
         """
         return dataset_scales.convert_to_display_units(self._dataset)
 
-    def find_scale_of_variable(self, variable_name: str) -> UnitScale | None:
+    def find_unit_scale_of_variable(self, variable_name: str) -> UnitScale | None:
         """Find the SI value of the dimensionless unit of a variable.
 
         Parameters
@@ -88,7 +90,7 @@ class DatasetUnits:
             If the dataset does not contain the scales of its rig.
         """
         scales = dataset_scales.read_si_scales(self._dataset)
-        return dataset_scales.find_scale_of_variable(self._dataset[variable_name], scales)
+        return dataset_scales.find_unit_scale_of_variable(self._dataset[variable_name], scales)
 
     def compute_slip_rate_from_log(
         self, variable_name: str, factor: float | xr.Variable, units: str
@@ -109,9 +111,11 @@ class DatasetUnits:
         dict of str to xarray.Variable
             Slip rate and its error estimate, by variable name.
         """
-        return dataset_scales.slip_rate_from_log(self._dataset, variable_name, factor, units)
+        return dataset_scales.compute_slip_rate_from_log(
+            self._dataset, variable_name, factor, units
+        )
 
     @property
-    def differ_from_units_of_figures(self) -> bool:
+    def has_units_other_than_display_units(self) -> bool:
         """True if the results do not have the units that study figures require."""
-        return dataset_scales.has_units_unexpected_by_its_figures(self._dataset)
+        return dataset_scales.has_units_other_than_display_units(self._dataset)

@@ -15,9 +15,9 @@ import numpy as np
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.column_reading import ReadingOptions, read_columns
+from rsfstudy.rig.column_reading import RecordReadingOptions, read_columns
 from rsfstudy.rig.columns import Column
-from rsfstudy.rig.common_headings import UsableColumns
+from rsfstudy.rig.common_headings import AcceptedRecordColumns
 from rsfstudy.rig.rig import DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD, Rig
 from rsfstudy.rig.table_files import read_table
 from rsfstudy.slider import (
@@ -118,7 +118,7 @@ def history(
     2.0
     """
     found = _read_history_columns(
-        record, columns, rig, ReadingOptions.from_keywords("history", reading)
+        record, columns, rig, RecordReadingOptions.from_keywords("history", reading)
     )
     if "time" not in found or len(found) == 1:
         remedy = 'Pass, for example, {"time": ..., "displacement": ...}.'
@@ -164,7 +164,7 @@ def _read_history_columns(
     record: Any,
     selected_columns: Mapping[str, Any] | None,
     rig: Rig | None,
-    reading_options: ReadingOptions,
+    reading_options: RecordReadingOptions,
 ) -> dict[str, Column]:
     """Read the columns of a source that describe a loading history."""
     if reading_options.filter:
@@ -175,8 +175,8 @@ def _read_history_columns(
             "cannot be applied to a loading history",
             remedy=remedy,
         )
-    usable = UsableColumns((*_DIMENSIONLESS_UNIT_BY_HISTORY_COLUMN,))
-    found = read_columns(record, selected_columns, usable, reading_options).columns
+    usable = AcceptedRecordColumns((*_DIMENSIONLESS_UNIT_BY_HISTORY_COLUMN,))
+    found = read_columns(record, selected_columns, usable, reading_options).columns_by_name
     for name, column in found.items():
         if rig is not None and hasattr(record, "data_vars") and not column.units:
             raise InvalidValue(

@@ -16,18 +16,18 @@ import numpy as np
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import RECORD_COLUMNS, Record
-from rsfstudy.rig.column_reading import ColumnsReadFromSource, ReadingOptions, read_columns
+from rsfstudy.rig.column_reading import ColumnsReadFromSource, RecordReadingOptions, read_columns
 from rsfstudy.rig.common_headings import (
-    UsableColumns,
+    AcceptedRecordColumns,
     build_missing_columns_error,
     compute_factor_to_record_units,
 )
-from rsfstudy.rig.rig_quantities import is_stiffness_over_normal_stress
-from rsfstudy.rig.row_selection import parse_filter
+from rsfstudy.rig.rig_quantities import is_stiffness_in_friction_per_length
+from rsfstudy.rig.row_selection import parse_smoothing_filter
 from rsfstudy.rig.units import convert_to_si
 
 #: Columns of a file from which a ``Record`` is built.
-_USABLE_RECORD_COLUMNS = UsableColumns(
+_ACCEPTED_RECORD_COLUMNS = AcceptedRecordColumns(
     ("time", "displacement", "slip", "friction", "shear_stress", "normal_stress")
 )
 
@@ -130,19 +130,19 @@ def read_record(
     >>> record.columns["friction"].round(6)
     array([0.6 , 0.62, 0.64])
     """
-    options = ReadingOptions(rows, begin, end, thin, filter, decimal, sheet, area)
+    options = RecordReadingOptions(rows, begin, end, thin, filter, decimal, sheet, area)
     earlier = source if isinstance(source, Record) else None
     if earlier is not None and earlier.filter and filter:
         rule = "cannot be applied, because the record is already filtered"
         raise InvalidValue("filter", filter, rule, remedy="Apply one filter only.")
-    found = read_columns(source, columns, _USABLE_RECORD_COLUMNS, options)
-    values = {key: _convert_to_record_units(key, found) for key in found.columns}
+    found = read_columns(source, columns, _ACCEPTED_RECORD_COLUMNS, options)
+    values = {key: _convert_to_record_units(key, found) for key in found.columns_by_name}
     _check_required_columns(found)
     _add_derived_columns(values, normal_stress, stiffness)
     values = {q.name: values[q.name] for q in RECORD_COLUMNS if q.name in values}
     values, smoothing = options.filter_and_thin_columns(values, ("friction",))
     processing = tuple(found.row_selection_descriptions + smoothing)
-    if (chosen := parse_filter(filter)) is not None:
+    if (chosen := parse_smoothing_filter(filter)) is not None:
         filter = f"{chosen.kind} {chosen.size!r}"
     if earlier is not None:
         processing = earlier.processing + processing
@@ -156,21 +156,19 @@ def _convert_to_record_units(
     column_name: str, columns_of_source: ColumnsReadFromSource
 ) -> np.ndarray:
     """Return the values of a column in the units of a ``Record``."""
-    column = columns_of_source.columns[column_name]
+    column = columns_of_source.columns_by_name[column_name]
     try:
         return column.values * compute_factor_to_record_units(column_name, column.units)
     except InvalidValue as error:
         if not column.one_based_column_number:
             raise
-        place = (
-            f"{columns_of_source.table.heading_location}, column {column.one_based_column_number}"
-        )
+        place = f"{columns_of_source.source_table.heading_location}, column {column.one_based_column_number}"
         raise error.with_location(place) from error
 
 
 def _check_required_columns(columns_of_source: ColumnsReadFromSource) -> None:
     """Raise ``InvalidValue`` if a required column of a record is missing."""
-    names, table = columns_of_source.columns, columns_of_source.table
+    names, table = columns_of_source.columns_by_name, columns_of_source.source_table
     moved = {"displacement", "slip"} & {*names}
     rubbed = {"friction", "shear_stress"} & {*names}
     if not ("time" in names and moved):
@@ -265,7 +263,7 @@ def _compute_load_point_displacement(
         raise InvalidValue("slip", ..., rule, remedy=remedy)
     friction, stress = values_by_column["friction"], values_by_column.get("normal_stress")
     is_number = isinstance(stiffness, int | float)
-    over_stress = is_number or is_stiffness_over_normal_stress(stiffness)
+    over_stress = is_number or is_stiffness_in_friction_per_length(stiffness)
     if is_number:
         per_um = float(stiffness)
     else:

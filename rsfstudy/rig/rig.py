@@ -23,7 +23,7 @@ from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.rig import axes_with_units
 from rsfstudy.rig.dataset_scales import (
     UnitScale,
-    build_scales_of_rig,
+    compute_unit_scales_of_rig,
     convert_dataset_units,
     read_si_scales,
 )
@@ -36,11 +36,11 @@ from rsfstudy.rig.rig_quantities import (
     SI_UNIT_BY_SCALE,
     check_rig_quantities_are_consistent,
     convert_rig_to_display_units,
-    convert_rig_value_and_warn_if_unusual,
     convert_rig_value_to_si,
+    convert_rig_value_to_si_and_warn,
     derive_scene_fields_from_rig,
-    find_si_units_of_field,
-    is_stiffness_over_normal_stress,
+    find_si_units_of_scene_field,
+    is_stiffness_in_friction_per_length,
 )
 from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider import Protocol, Scene, SceneFields, protocol
@@ -144,7 +144,7 @@ class Rig(HtmlTableMixin):
 
     #: Quantities of a rig by name, with their units and limits.
     QUANTITIES: ClassVar = RIG_QUANTITIES
-    is_stiffness_over_stress = staticmethod(is_stiffness_over_normal_stress)
+    is_stiffness_in_friction_per_length = staticmethod(is_stiffness_in_friction_per_length)
     convert_quantities_for_display = staticmethod(convert_rig_to_display_units)
 
     normal_stress: Any
@@ -174,7 +174,7 @@ class Rig(HtmlTableMixin):
                 object.__setattr__(
                     self,
                     name,
-                    convert_rig_value_and_warn_if_unusual(
+                    convert_rig_value_to_si_and_warn(
                         name, getattr(self, name), self._normal_stress_in_pa
                     ),
                 )
@@ -197,7 +197,7 @@ class Rig(HtmlTableMixin):
     @property
     def scales(self) -> dict[str, UnitScale]:
         """SI values of dimensionless units such as ``D_c/V_*``."""
-        return build_scales_of_rig(self.as_dict())
+        return compute_unit_scales_of_rig(self.as_dict())
 
     def dimensionless(self, value: Any, scale: str = "D_c/V_*", name: str = "value") -> float:
         """Convert a quantity to a dimensionless number.
@@ -266,7 +266,7 @@ class Rig(HtmlTableMixin):
         """
         if "b" in fields:
             fields = replace_b_by_b_over_a(fields)
-        if find_si_units_of_field("instability_norm", norm := fields.get("instability_norm")):
+        if find_si_units_of_scene_field("instability_norm", norm := fields.get("instability_norm")):
             scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
             return scene.with_(instability_norm=convert_to_instability_norm(self, norm, scene))
         for name in RATIO_FIELD_BY_DIMENSIONAL_NAME.keys() & fields.keys():
@@ -284,7 +284,7 @@ class Rig(HtmlTableMixin):
             for n, v in fields.items()
         }
         hot = fields.get("temperature") != "isothermal"
-        fields = {**derive_scene_fields_from_rig(self.as_dict(), with_heat=hot), **fields}
+        fields = {**derive_scene_fields_from_rig(self.as_dict(), with_shear_heating=hot), **fields}
         for simplest in ("constant", "imposed") if "normal_stress" not in fields else ():
             with contextlib.suppress(InvalidValue):
                 return Scene(normal_stress=simplest, **fields)
@@ -345,7 +345,10 @@ class Rig(HtmlTableMixin):
             If a segment is invalid, or if its units are incompatible.
         """
         if isinstance(segments, list | tuple):
-            segments = [self._convert_to_segment(n, s) for n, s in enumerate(segments, start=1)]
+            segments = [
+                self._convert_to_dimensionless_segment(n, s)
+                for n, s in enumerate(segments, start=1)
+            ]
         return protocol(segments, name)
 
     def in_units(
@@ -414,7 +417,7 @@ class Rig(HtmlTableMixin):
         return self.normal_stress if isinstance(self.normal_stress, float) else None
 
     def _convert_to_scene_field(self, field_name: str, value: Any) -> Any:
-        units = find_si_units_of_field(field_name, value)
+        units = find_si_units_of_scene_field(field_name, value)
         if units is None or value is None:
             return value
         scale = SCENE_QUANTITY_BY_FIELD_NAME[field_name].scale
@@ -424,7 +427,7 @@ class Rig(HtmlTableMixin):
             else convert_to_si(field_name, value, units)
         )
 
-    def _convert_to_segment(self, segment_number: int, segment_fields: Any) -> Any:
+    def _convert_to_dimensionless_segment(self, segment_number: int, segment_fields: Any) -> Any:
         if not isinstance(segment_fields, Mapping):
             return segment_fields  # A Segment is dimensionless.
         try:

@@ -115,7 +115,7 @@ RATIO_FIELD_BY_DIMENSIONAL_NAME = {
 }
 
 
-def convert_rig_value_and_warn_if_unusual(
+def convert_rig_value_to_si_and_warn(
     quantity_name: str, value: Any, normal_stress: float | None = None
 ) -> float:
     """Convert a rig quantity to SI units, and warn about unusual values.
@@ -189,12 +189,16 @@ def convert_rig_value_to_si(
     try:
         return convert_to_si(quantity_name, value, units)
     except InvalidValue:
-        if units == "Pa/m" and normal_stress is not None and is_stiffness_over_normal_stress(value):
+        if (
+            units == "Pa/m"
+            and normal_stress is not None
+            and is_stiffness_in_friction_per_length(value)
+        ):
             return convert_to_si(quantity_name, value, "1/m") * normal_stress
         raise
 
 
-def is_stiffness_over_normal_stress(stiffness: Any) -> bool:
+def is_stiffness_in_friction_per_length(stiffness: Any) -> bool:
     """Return True if a stiffness has units of friction over displacement.
 
     Parameters
@@ -298,7 +302,7 @@ def convert_rig_to_display_units(
 
 
 def derive_scene_fields_from_rig(
-    rig_values: Mapping[str, Any], *, with_heat: bool = True
+    rig_values: Mapping[str, Any], *, with_shear_heating: bool = True
 ) -> dict[str, Any]:
     """Compute the scene fields that follow from the rig quantities.
 
@@ -330,7 +334,7 @@ def derive_scene_fields_from_rig(
             impedance * rig_values["reference_velocity"] / rig_values["normal_stress"]
         )
     choices: dict[str, Any] = {"inertia": True} if "period" in found else {}
-    if with_heat and "heat_capacity" in rig_values:
+    if with_shear_heating and "heat_capacity" in rig_values:
         found |= _derive_shear_heating_fields(rig_values)
         choices["temperature"] = "shear_heating"
         choices |= {"fluid": "thermal"} if "pressurisation" in found else {}
@@ -377,7 +381,7 @@ def is_dimensionless_field_with_scale(field_name: str) -> bool:
     )
 
 
-def find_si_units_of_field(field_name: str, value: Any) -> str | None:
+def find_si_units_of_scene_field(field_name: str, value: Any) -> str | None:
     """Return the SI units for a value of a scene field.
 
     Parameters

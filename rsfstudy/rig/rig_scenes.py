@@ -15,7 +15,7 @@ import numpy as np
 from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.axes_with_units import compute_factor_to_si, make_axis_with_units
-from rsfstudy.rig.dataset_scales import DIMENSIONLESS_PREFIX, build_scales_of_rig
+from rsfstudy.rig.dataset_scales import DIMENSIONLESS_PREFIX, compute_unit_scales_of_rig
 from rsfstudy.rig.rig import Rig, convert_to_instability_norm
 from rsfstudy.rig.rig_quantities import (
     AXIS_NAME_BY_RIG_QUANTITY,
@@ -26,17 +26,17 @@ from rsfstudy.rig.rig_quantities import (
     SCENE_QUANTITY_BY_FIELD_NAME,
     SI_UNIT_BY_SCALE,
     check_rig_quantities_are_consistent,
-    convert_rig_value_and_warn_if_unusual,
+    convert_rig_value_to_si_and_warn,
     derive_scene_fields_from_rig,
     is_dimensionless_field_with_scale,
-    is_stiffness_over_normal_stress,
+    is_stiffness_in_friction_per_length,
 )
 from rsfstudy.rig.units import multiply_by_exact_fraction
 from rsfstudy.slider import Scene
 
 
 @dataclass(frozen=True)
-class LatticeScenesOnRig:
+class RigAxesToScenesConverter:
     """Converter from axes with physical units to dimensionless scene fields.
 
     If an axis varies a scale such as the slip distance, fields of the base scene keep their SI
@@ -87,7 +87,7 @@ class LatticeScenesOnRig:
     def _derive_scene_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
         """Compute scene fields from the rig, without heating if the base is isothermal."""
         hot = self.base_scene.parts.temperature.name != "isothermal"
-        return derive_scene_fields_from_rig(rig_values, with_heat=hot)
+        return derive_scene_fields_from_rig(rig_values, with_shear_heating=hot)
 
     @property
     def units_by_axis_name(self) -> dict[str, str]:
@@ -118,7 +118,7 @@ class LatticeScenesOnRig:
                 found[RIG_QUANTITY_BY_AXIS_NAME[name]] = multiply_by_exact_fraction(
                     axis_row[name], compute_factor_to_si(name, units[name])
                 )
-        in_friction = is_stiffness_over_normal_stress(f"1 {units.get('stiffness', '')}")
+        in_friction = is_stiffness_in_friction_per_length(f"1 {units.get('stiffness', '')}")
         if axis_row.get("stiffness") is not None and in_friction:
             found["stiffness"] = found["stiffness"] * found["normal_stress"]
         check_rig_quantities_are_consistent(found)
@@ -140,9 +140,7 @@ class LatticeScenesOnRig:
         units, rig = self.units_by_axis_name, self.compute_rig_quantities(axis_row)
         here, found = compute_scale_factors_of_rig(rig), {}
         if set(RIG_QUANTITY_BY_AXIS_NAME) & set(units) & set(axis_row):
-            found = self._compute_base_fields_with_fixed_si_value(here) | self._derive_scene_fields(
-                rig
-            )
+            found = self._rescale_base_fields_to_cell_scales(here) | self._derive_scene_fields(rig)
             if "period" in self.rig.as_dict() and not self.base_scene.has_mass:
                 # The base scene ignores the inertia of the rig.
                 found.pop("inertia", None)
@@ -156,7 +154,7 @@ class LatticeScenesOnRig:
                 found[field] = in_si / (here[scale] if scale else 1.0)
         return found
 
-    def _compute_base_fields_with_fixed_si_value(
+    def _rescale_base_fields_to_cell_scales(
         self, scale_factors_of_cell: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Return the base scene fields that have the same SI value in all cells."""
@@ -177,7 +175,7 @@ class LatticeScenesOnRig:
             )
         return held
 
-    def compute_scale_and_field_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    def compute_scale_and_scene_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
         """Compute the dimensionless fields and scales of all lattice cells.
 
         Returns
@@ -206,7 +204,7 @@ class LatticeScenesOnRig:
                     if isinstance(value, float):
                         column = [axis.rows[n][name] for n in rows[place].tolist()]
                         numbers[name] = np.array(column).reshape(shaped)
-            for name, values in self._compute_scales_and_fields(numbers).items():
+            for name, values in self._compute_scales_and_scene_fields(numbers).items():
                 whole = found.setdefault(name, np.full(shape, np.nan))
                 whole[np.ix_(*rows)] = values
         squeezed = {
@@ -217,7 +215,7 @@ class LatticeScenesOnRig:
             for name, (dims, values) in squeezed.items()
         }
 
-    def _compute_scales_and_fields(self, axis_row: Mapping[str, Any]) -> dict[str, Any]:
+    def _compute_scales_and_scene_fields(self, axis_row: Mapping[str, Any]) -> dict[str, Any]:
         units, rig = self.units_by_axis_name, self.compute_rig_quantities(axis_row)
         scales_ = {
             AXIS_NAME_BY_RIG_QUANTITY.get(name, name): rig[name] for name in REQUIRED_RIG_QUANTITIES
@@ -321,13 +319,13 @@ def replace_rig_quantity(
         )
     axis = make_axis_with_units(quantity_name, [value])
     changed = base_scene.with_(
-        **LatticeScenesOnRig(rig, base_scene, [axis]).compute_scene_fields(axis.rows[0])
+        **RigAxesToScenesConverter(rig, base_scene, [axis]).compute_scene_fields(axis.rows[0])
     )
     if quantity_name in RIG_QUANTITY_BY_AXIS_NAME:
         quantity = RIG_QUANTITY_BY_AXIS_NAME[quantity_name]
         rig = replace(
             rig,
-            **{quantity: convert_rig_value_and_warn_if_unusual(quantity, value, rig.normal_stress)},
+            **{quantity: convert_rig_value_to_si_and_warn(quantity, value, rig.normal_stress)},
         )
     return rig, changed
 
@@ -345,7 +343,7 @@ def compute_scale_factors_of_rig(rig_values: Mapping[str, Any]) -> dict[str, Any
     dict of str to float or ndarray
         SI value of each dimensionless unit.
     """
-    return {name: scale.factor for name, scale in build_scales_of_rig(rig_values).items()}
+    return {name: scale.factor for name, scale in compute_unit_scales_of_rig(rig_values).items()}
 
 
 def _add_second_point_to_axis(axis: Axis) -> Axis:

@@ -14,6 +14,8 @@ class RigAxes:
     create_axis = staticmethod(axes_with_units.make_axis_with_units)
     find_axis_name_and_si_units = staticmethod(axes_with_units.find_axis_name_and_si_units)
     convert_values_to_units = staticmethod(axes_with_units.convert_values_to_units)
-    convert_axis_to_stated_units = staticmethod(axes_with_units.convert_axis_to_stated_units)
+    convert_axis_values_to_axis_units = staticmethod(
+        axes_with_units.convert_axis_values_to_axis_units
+    )
     replace_rig_quantity = staticmethod(rig_scenes.replace_rig_quantity)
     convert_scene_and_axes_to_rig = staticmethod(rig_scenes.convert_scene_and_axes_to_rig)

@@ -66,9 +66,9 @@ class RowSelection:
             raise InvalidValue("rows", self.rows, rule, remedy="Pass, for example, rows=(1, 5000).")
         if not isinstance(self.thin, int) or isinstance(self.thin, bool) or self.thin < 1:
             raise InvalidValue("thin", self.thin, "must be a whole number, 1 or more")
-        parse_filter(self.filter)
+        parse_smoothing_filter(self.filter)
 
-    def keep_selected_rows(
+    def keep_rows_between_limits(
         self, columns: Mapping[str, Column]
     ) -> tuple[dict[str, Column], list[str]]:
         """Select the rows between the limits.
@@ -156,7 +156,7 @@ class RowSelection:
         return len(inside) - int(np.argmax(inside[::-1]))
 
     def filter_and_thin_columns(
-        self, columns: Mapping[str, np.ndarray], filtered_names: Sequence[str]
+        self, columns: Mapping[str, np.ndarray], filtered_column_names: Sequence[str]
     ) -> tuple[dict[str, np.ndarray], list[str]]:
         """Filter friction or stress, and keep every ``thin``-th row.
 
@@ -182,17 +182,20 @@ class RowSelection:
             intervals.
         """
         found, processing = dict(columns), []
-        if chosen := parse_filter(self.filter):
+        if chosen := parse_smoothing_filter(self.filter):
             if "time" not in found:
                 remedy = "Omit the filter."
                 raise InvalidValue(
                     "filter", self.filter, "requires the column 'time'", remedy=remedy
                 )
             time = found["time"]
-            kept = chosen.complete_rows(time)
-            found |= {name: chosen.filter_rows(time, found[name]) for name in filtered_names}
+            kept = chosen.find_fully_averaged_rows(time)
+            found |= {
+                name: chosen.filter_recorded_values(time, found[name])
+                for name in filtered_column_names
+            }
             found = {name: values[kept] for name, values in found.items()}
-            processing.append(f"{' and '.join(filtered_names)} filtered by {self.filter}")
+            processing.append(f"{' and '.join(filtered_column_names)} filtered by {self.filter}")
         if self.thin > 1:
             found = {name: values[:: self.thin].copy() for name, values in found.items()}
             processing.append(f"one of every {self.thin} rows")
@@ -207,7 +210,7 @@ def _is_pair_of_row_numbers(rows: Any) -> bool:
     return is_integer and 1 <= rows[0] <= rows[1]
 
 
-def parse_filter(filter_text: str) -> Filter | None:
+def parse_smoothing_filter(filter_text: str) -> Filter | None:
     """Create a filter from a string with units.
 
     Parameters

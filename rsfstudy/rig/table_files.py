@@ -20,7 +20,7 @@ from rsfstudy.rig.columns import (
     parse_column_selection,
 )
 from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.table_sources import SourceTable
+from rsfstudy.rig.readers.table_sources import LazyTable
 
 __getattr__ = build_getattr_for_former_names(__name__)
 
@@ -95,7 +95,7 @@ def read_table(
 
 
 def _choose_all_columns_of_header(
-    table: SourceTable,
+    table: LazyTable,
 ) -> dict[str, ColumnSelection]:
     """Select all columns of a file whose header contains names and units."""
     found: dict[str, ColumnSelection] = {}

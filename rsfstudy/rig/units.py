@@ -266,10 +266,12 @@ def _convert_quantity_text_to_si(quantity_name: str, text: str, si_units: str) -
         return number
     stated = _convert_shortest_decimal_to_fraction(number)
     if not all(unit in _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT for unit, _power in powers):
-        size = _compute_factor_with_pint(quantity_name, text, powers, si_units)
+        size = _compute_si_factor_with_pint(quantity_name, text, powers, si_units)
         return stated * Fraction(size) if math.isfinite(size) else size
-    scale, exponents = _compute_factor_of_known_units(powers)
-    wanted = _compute_factor_of_known_units(_parse_unit_powers(si_units.removeprefix("1")) or [])[1]
+    scale, exponents = _compute_si_factor_of_known_units(powers)
+    wanted = _compute_si_factor_of_known_units(
+        _parse_unit_powers(si_units.removeprefix("1")) or []
+    )[1]
     if exponents == (wanted[0], wanted[1] + 2, *wanted[2:]):
         rule = "must be a stress, not a force"
         raise InvalidValue(quantity_name, text, rule, remedy="Divide the force by the fault area.")
@@ -299,7 +301,7 @@ def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
     return [(name, int(power or 1) * (-1 if over else 1)) for over, name, power in found]
 
 
-def _compute_factor_of_known_units(
+def _compute_si_factor_of_known_units(
     units_and_powers: Iterable[tuple[str, int]],
 ) -> SiFactorAndBaseUnitExponents:
     """Multiply powers of units that are known without pint."""
@@ -311,7 +313,7 @@ def _compute_factor_of_known_units(
     return scale, tuple(exponents)
 
 
-def _compute_factor_with_pint(
+def _compute_si_factor_with_pint(
     quantity_name: str, text: str, units_and_powers: Iterable[tuple[str, int]], si_units: str
 ) -> float:
     try:
@@ -392,4 +394,4 @@ def find_si_factor_and_exponents(units: str) -> SiFactorAndBaseUnitExponents | N
         name in _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT for name, _power in powers
     ):
         return None
-    return _compute_factor_of_known_units(powers)
+    return _compute_si_factor_of_known_units(powers)

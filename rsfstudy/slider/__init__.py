@@ -61,7 +61,7 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 if TYPE_CHECKING:
     from rsfstudy.slider.closed_forms import (
         CLOSED_FORMS,
-        compute_effective_friction,
+        compute_coulomb_effective_friction,
     )
     from rsfstudy.slider.closed_forms import (
         compute_critical_stiffness as critical_stiffness_closed_form,
@@ -165,7 +165,7 @@ __all__ = [
     "cached_attribute",
     "cached_per_scene",
     "critical_stiffness_closed_form",
-    "compute_effective_friction",
+    "compute_coulomb_effective_friction",
     "compute_displacement_per_path_length",
     "protocol",
     "replace_field_values",

@@ -161,7 +161,7 @@ def compute_critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -
     return 1.0 + 1.0 / ((1.0 - law_exponent) * (b_over_a - 1.0))
 
 
-def compute_effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
+def compute_coulomb_effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
     r"""Compute the effective friction coefficient for Coulomb stress changes.
 
     Parameters
@@ -191,7 +191,7 @@ def compute_effective_friction(mu_star: float, b_over_a: float, alpha: float) ->
     return mu_star - alpha * (1.0 - 1.0 / b_over_a) if alpha else mu_star
 
 
-def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: float) -> float:
+def compute_state_offset_at_instability(law_exponent: float, stiffness_ratio: float) -> float:
     r"""Compute the offset from steady state at the onset of instability.
 
     Parameters
@@ -215,7 +215,7 @@ def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: flo
     return -math.log1p(-product) / law_exponent if law_exponent else stiffness_ratio
 
 
-def steady_state_offset_after_normal_stress_fall(
+def compute_state_offset_after_stress_fall(
     mu_star: float, a: float, b_over_a: float, alpha: float, normal_stress_ratio: float
 ) -> float:
     r"""Compute the offset from steady state after a drop of normal stress.
@@ -291,10 +291,9 @@ def compute_critical_normal_stress_step(
 
     def excess_over_threshold(growth: float) -> float:
         quotient = 1.0 + growth
-        needed = steady_state_offset_at_instability(law_exponent, quotient * stiffness_ratio)
+        needed = compute_state_offset_at_instability(law_exponent, quotient * stiffness_ratio)
         return (
-            steady_state_offset_after_normal_stress_fall(mu_star, a, b_over_a, alpha, quotient)
-            - needed
+            compute_state_offset_after_stress_fall(mu_star, a, b_over_a, alpha, quotient) - needed
         )
 
     factor = (_MAX_STRESS_FALL / _MIN_STRESS_FALL) ** (1.0 / _STRESS_FALL_COUNT)

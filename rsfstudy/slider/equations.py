@@ -66,7 +66,7 @@ class EquationsOfMotion(NamedTuple):
         equations for ruptures and for rigid sliders.
     """
 
-    regime: str
+    regime_name: str
     unknown_names: tuple[str, ...]
     unknown_scales: tuple[float, ...]
     rate_function: NumericFunction
@@ -96,7 +96,7 @@ class EquationsOfMotion(NamedTuple):
 
         The independent variable of a rigid slider is slip.
         """
-        return self.regime == RIGID_REGIME
+        return self.regime_name == RIGID_REGIME
 
     def evaluate_motion_point(self, unknown_values: FloatTuple) -> MotionPoint:
         """Compute stress, slip rate and states from the values of the unknowns.
@@ -160,7 +160,7 @@ def build_equations_without_mass(scene: SceneView, *, with_time: bool) -> Equati
 
 
 def _build_equations_for_dynamics(
-    scene: SceneView, dynamics: Dynamics, *, with_time: bool, along_path: bool = True
+    scene: SceneView, dynamics: Dynamics, *, with_time: bool, against_path_length: bool = True
 ) -> EquationsOfMotion:
     """Build the equations between ruptures for the given dynamics."""
     friction = scene.friction_functions
@@ -175,10 +175,10 @@ def _build_equations_for_dynamics(
     if with_time:
         unknowns, scales = (*unknowns, "time"), (*scales, 1.0)
     return EquationsOfMotion(
-        dynamics.regime,
+        dynamics.regime_name,
         unknowns,
         scales,
-        by_path_with_time if with_time else by_path if along_path else by_displacement,
+        by_path_with_time if with_time else by_path if against_path_length else by_displacement,
         build_point_function_between_ruptures(friction, balance, growth),
         scene.parameter_values,
         friction.state_count,
@@ -233,7 +233,7 @@ def build_equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> 
 
 
 def _build_rupture_equations(
-    scene: SceneView, *, with_time: bool = False, along_path: bool = True
+    scene: SceneView, *, with_time: bool = False, against_path_length: bool = True
 ) -> EquationsOfMotion:
     """Build the rupture equations. Raise TypeError if the scene has no inertia."""
     a, friction, others = scene.a, scene.friction_functions, _list_state_names(scene)[1:]
@@ -252,7 +252,7 @@ def _build_rupture_equations(
         RUPTURE_REGIME,
         unknowns,
         scales,
-        by_path_with_time if with_time else by_path if along_path else by_time,
+        by_path_with_time if with_time else by_path if against_path_length else by_time,
         build_point_function_in_rupture(friction),
         scene.parameter_values,
         friction.state_count,
@@ -277,7 +277,9 @@ def build_equations_against_displacement(scene: SceneView) -> EquationsOfMotion:
     EquationsOfMotion
         Equations with displacement as the independent variable.
     """
-    return _build_equations_for_dynamics(scene, scene.dynamics, with_time=False, along_path=False)
+    return _build_equations_for_dynamics(
+        scene, scene.dynamics, with_time=False, against_path_length=False
+    )
 
 
 def build_equations_against_inertial_time(scene: SceneView) -> EquationsOfMotion:
@@ -298,7 +300,7 @@ def build_equations_against_inertial_time(scene: SceneView) -> EquationsOfMotion
     TypeError
         If the scene has no inertia.
     """
-    return _build_rupture_equations(scene, along_path=False)
+    return _build_rupture_equations(scene, against_path_length=False)
 
 
 def build_equations_at_imposed_slip_rate(

@@ -46,9 +46,9 @@ class StateEvolutionDerivatives(NamedTuple):
     """
 
     with_respect_to_log_slip_rate: list[float]
-    with_respect_to_state_shift: list[float]
+    with_respect_to_stress_induced_shift: list[float]
     with_respect_to_states: NestedListMatrix
-    relative_error: float
+    max_relative_error_estimate: float
 
     def with_perturbed_derivatives(self, relative_change: float) -> StateEvolutionDerivatives:
         r"""Return a copy in which all derivatives are multiplied by factors near 1.
@@ -191,7 +191,7 @@ def _compute_central_differences_at_zero(
 
 
 def _compute_finite_difference_scales(
-    scene: SceneView, steady_state: SteadySliding, state_shift: float
+    scene: SceneView, steady_state: SteadySliding, stress_induced_state_shift: float
 ) -> list[float]:
     """Return the finite-difference scales of ln V, the shift and each state."""
     size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_over_a
@@ -202,7 +202,7 @@ def _compute_finite_difference_scales(
     if len(steady_state.states) == 1:
         return [1.0, of_shift, size]
     slow, fast = (
-        compute_steady_states(scene, steady_state.log_slip_rate + x, state_shift)
+        compute_steady_states(scene, steady_state.log_slip_rate + x, stress_induced_state_shift)
         for x in (-1.0, 1.0)
     )
     moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]

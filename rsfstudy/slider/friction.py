@@ -92,7 +92,7 @@ class FrictionFunctions(NamedTuple):
 
     strength: NumericFunction
     effective_normal_stress: NumericFunction
-    rig_normal_stress: NumericFunction
+    measured_effective_normal_stress: NumericFunction
     boundary_pressure: NumericFunction
     state_evolutions: NumericFunction
     steady_states: NumericFunction
@@ -122,7 +122,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         Friction functions of the scene. All scenes with the same combination of parts have the same
         functions.
     """
-    law, source, loading = scene.parts.law, scene.pressure_source, scene.stress_loading
+    law, source, loading = scene.parts.law, scene.pressure_source, scene.stress_imposing_part
     oscillates, law_states = loading.has_load_point_unknown, law.state_count
     boundary = -1 - len(scene.parts.fluid.unknowns) if loading.adds_normal_stress_unknowns else 0
     strength, effective, outer, derivatives = _build_functions_of_frictional_stress(
@@ -148,7 +148,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
     functions = FrictionFunctions(
         strength=strength,
         effective_normal_stress=effective,
-        rig_normal_stress=outer,
+        measured_effective_normal_stress=outer,
         boundary_pressure=friction_relation.build_pore_pressure_function(boundary),
         state_evolutions=evolutions,
         steady_states=steady_states,
@@ -216,13 +216,13 @@ def _build_functions_of_frictional_stress(
     strength = (
         friction_relation.build_strength_function(effective, effect)
         if is_variable or state_effect_functions or kind_of_last_unknown == "pressure"
-        else friction_relation.friction_relation_at_constant_normal_stress
+        else friction_relation.compute_strength_at_constant_normal_stress
     )
     if allows_reversed_slip:
         strength = friction_relation.extend_relation_to_reversed_slip(strength)
     if kind_of_last_unknown == "load point":
         strength, effective, outer = map(
-            friction_relation.wrap_with_load_point_stress, (strength, effective, outer)
+            friction_relation.add_load_point_stress_to_argument, (strength, effective, outer)
         )
         derivatives = friction_relation.build_strength_derivatives_by_load_point(strength)
     else:
@@ -300,7 +300,9 @@ def build_state_evolution_function(
     return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
 
 
-def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: float) -> FloatTuple:
+def compute_steady_states(
+    scene: SceneView, log_slip_rate: float, stress_induced_state_shift: float
+) -> FloatTuple:
     r"""Compute the states of steady sliding at a slip rate.
 
     Parameters
@@ -318,7 +320,9 @@ def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: f
         States :math:`\Psi_i` of steady sliding.
     """
     p = scene.friction_parameter_values
-    states: FloatTuple = scene.friction_functions.steady_states(log_slip_rate, state_shift, p)
+    states: FloatTuple = scene.friction_functions.steady_states(
+        log_slip_rate, stress_induced_state_shift, p
+    )
     if not scene.parts.temperature.unknowns:
         return states
     place = scene.parts.law.state_count

@@ -119,7 +119,7 @@ def return_zero_pore_pressure(states: FloatTuple) -> float:
 FrictionRelationValues = tuple[float, float, float, float]
 
 
-def friction_relation_at_constant_normal_stress(
+def compute_strength_at_constant_normal_stress(
     frictional_stress: float, states: FloatTuple, p: FloatTuple
 ) -> FrictionRelationValues:
     """Evaluate the friction relation at constant normal stress.
@@ -286,7 +286,7 @@ def compute_load_point_stress(states: FloatTuple, p: FloatTuple) -> float:
     return states[-1] - p[LOADING + 2]
 
 
-def wrap_with_load_point_stress(friction_function: NumericFunction) -> NumericFunction:
+def add_load_point_stress_to_argument(friction_function: NumericFunction) -> NumericFunction:
     """Return a friction function that includes the load point stress.
 
     The argument g of ``friction_function`` is the total frictional stress. The argument g of the

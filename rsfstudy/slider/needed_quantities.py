@@ -113,7 +113,7 @@ def find_quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str
     constant = {NORMAL_STRESS, PORE_PRESSURE} - {
         change.unknown_quantity_name for change in _find_causes_of_unknown_quantities(scene)
     }
-    found = constant | part.received_quantities
+    found = constant | part.received_quantity_names
     if part is scene.parts.law and _find_causes_of_unknown_friction(scene):
         found -= {FRICTION_COEFFICIENT}
     return frozenset(

@@ -27,7 +27,7 @@ _BASE_INTERVAL_BINARY_EXPONENT = 32
 _SAMPLES_PER_BLOCK = 4096
 #: Smallest distance between the start or end of a loading segment and a sample, relative to the
 #: sampling interval. Closer samples are left out, because rounding errors dominate the distance.
-_MIN_TIME_TO_SAMPLE_OVER_INTERVAL = 1e-9
+_MIN_TIME_GAP_OVER_SAMPLING_INTERVAL = 1e-9
 #: Number of words that the generator returns for each value of its counter.
 _RANDOM_WORDS_PER_COUNTER_VALUE = 4
 
@@ -180,9 +180,9 @@ def iterate_segment_table_blocks(
     ndarray of shape (rows, 7)
         Successive rows of the segment table. The columns are defined in ``parameter_layout``.
     """
-    first = math.floor(start_time / sampling_interval + _MIN_TIME_TO_SAMPLE_OVER_INTERVAL)
+    first = math.floor(start_time / sampling_interval + _MIN_TIME_GAP_OVER_SAMPLING_INTERVAL)
     stop, late = (
-        end_time / sampling_interval - _MIN_TIME_TO_SAMPLE_OVER_INTERVAL,
+        end_time / sampling_interval - _MIN_TIME_GAP_OVER_SAMPLING_INTERVAL,
         start_time - first * sampling_interval,
     )
     log_velocity = math.log(abs(load_velocity)) if load_velocity else -math.inf

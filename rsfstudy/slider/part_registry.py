@@ -65,17 +65,21 @@ class PartSlot:
     default_part_name: str
     long_name: str
     user_parts: dict[str, UserPart] = field(default_factory=dict)
-    omit_if_default: bool = False
+    default_omitted_from_stored_scenes: bool = False
 
     @property
-    def part_name_field_quantity(self) -> Quantity:
+    def quantity_of_selecting_field(self) -> Quantity:
         """``Quantity`` that describes the field whose value selects the part."""
         return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
     def part_class_by_selecting_field(self) -> Mapping[str, type[Part]]:
         """Mapping from field names to the parts that the fields select."""
-        return {part.selected_by: part for part in self.built_in_parts.values() if part.selected_by}
+        return {
+            part.selecting_field_name: part
+            for part in self.built_in_parts.values()
+            if part.selecting_field_name
+        }
 
 
 PART_SLOTS: tuple[PartSlot, ...] = (
@@ -114,7 +118,7 @@ PART_SLOTS: tuple[PartSlot, ...] = (
         temperature.BUILT_IN_TEMPERATURE_CLASS_BY_NAME,
         "isothermal",
         "temperature of the fault",
-        omit_if_default=True,
+        default_omitted_from_stored_scenes=True,
     ),
     PartSlot(
         "loading_noise",
@@ -122,7 +126,7 @@ PART_SLOTS: tuple[PartSlot, ...] = (
         noise.BUILT_IN_NOISE_CLASS_BY_NAME,
         "none",
         "noise that is added to the loading",
-        omit_if_default=True,
+        default_omitted_from_stored_scenes=True,
     ),
 )
 #: Slots whose part is selected by name. In the other slots, the values of fields such as
@@ -140,7 +144,7 @@ PART_CLASS_BY_FIELD_NAME: Mapping[str, type[Part]] = {
 }
 #: Quantities that describe the fields of a scene.
 SCENE_FIELD_QUANTITIES: tuple[Quantity, ...] = (
-    *(slot.part_name_field_quantity for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME),
+    *(slot.quantity_of_selecting_field for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME),
     *(about for part in _ALL_PART_CLASSES for about in list_part_field_quantities(part)),
 )
 #: Names of the fields of a scene.
@@ -150,7 +154,11 @@ SCENE_FIELD_NAMES: tuple[str, ...] = tuple(
 #: Fields that were added in later versions of rsfstudy, with their default values. Scenes list such
 #: a field only if it has a value. The keys of cells and stored scenes also omit the default value.
 DEFAULTS_OMITTED_FROM_STORED_SCENES: dict[str, Any] = {
-    **{slot.name: slot.default_part_name for slot in PART_SLOTS if slot.omit_if_default},
+    **{
+        slot.name: slot.default_part_name
+        for slot in PART_SLOTS
+        if slot.default_omitted_from_stored_scenes
+    },
     **{
         name: part.__dataclass_fields__[name].default
         for name, part in PART_CLASS_BY_FIELD_NAME.items()
@@ -303,7 +311,7 @@ def _check_user_part(slot: PartSlot, part: Any) -> None:
     _check_part_fields(slot, part)
     _check_unknowns_excluded_from_distance(slot, part)
     check_names_of_needed_quantities(slot.name, part)
-    for name in part.required_functions():
+    for name in part.list_required_function_names():
         function = getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):
             rule, remedy = (
@@ -490,7 +498,7 @@ def collect_scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, 
     found = {about.name: about for about in SCENE_FIELD_QUANTITIES}
     for kind in map(get_part_class, user_parts):
         for about in (
-            find_slot_of_part_class(kind).part_name_field_quantity,
+            find_slot_of_part_class(kind).quantity_of_selecting_field,
             *list_part_field_quantities(kind),
         ):
             if found.setdefault(about.name, about) != about:
@@ -522,7 +530,7 @@ def collect_scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, An
         for part in every:
             for name in list_part_field_names(part):
                 kind: Any = bool if is_boolean_field(part, name) else float
-                stated = name == part.selected_by or all(
+                stated = name == part.selecting_field_name or all(
                     name in list_part_field_names(one) for one in every
                 )
                 stated = stated and name not in DEFAULTS_OMITTED_FROM_STORED_SCENES

@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rsfstudy._deprecation import (
     accept_former_keyword_names,
     add_former_member_names,
-    add_new_names_for_former_members,
+    add_new_names_for_former_overrides,
     build_getattr_for_former_names,
 )
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
@@ -79,13 +79,13 @@ class Part:
     name: ClassVar[str]
     #: Name of the field whose value selects the part. The string is empty if the part is selected
     #: by its name.
-    selected_by: ClassVar[str] = ""
+    selecting_field_name: ClassVar[str] = ""
     #: Names of class members that are derived from the equations of the part, such as closed-form
     #: solutions.
-    derived_properties: ClassVar[tuple[str, ...]] = ()
+    members_derived_from_equations: ClassVar[tuple[str, ...]] = ()
     #: Names of class members that define the equations. If a subclass overrides one of these
     #: members, the subclass does not inherit ``derived_properties``.
-    defining_methods: ClassVar[frozenset[str]] = frozenset()
+    members_defining_equations: ClassVar[frozenset[str]] = frozenset()
     #: Unknowns of a fluid or a loading. The functions ``auxiliary_rates`` and
     #: ``auxiliary_steady_states`` below compute the rates and the steady values of the unknowns
     #: (see ``Fluid``).
@@ -98,12 +98,12 @@ class Part:
     #: the part need. A scene that cannot provide one of the quantities rejects the part.
     needs: ClassVar[Collection[str]] = frozenset()
     #: Names of the quantities that the functions of the part receive.
-    received_quantities: ClassVar[frozenset[str]] = frozenset()
+    received_quantity_names: ClassVar[frozenset[str]] = frozenset()
     auxiliary_rates: ClassVar[NumericFunction | None] = None
     auxiliary_steady_states: ClassVar[NumericFunction | None] = None
     #: Texts for error messages about a field that belongs to another part: the condition under
     #: which the field does not apply, and a remedy.
-    rejection_hint: ClassVar[tuple[str, str]] = ("", "")
+    rejection_condition_and_remedy: ClassVar[tuple[str, str]] = ("", "")
 
     def __init_subclass__(cls) -> None:
         """Reset the derived properties if the subclass changes the equations.
@@ -113,10 +113,10 @@ class Part:
         class.
         """
         super().__init_subclass__()
-        add_new_names_for_former_members(cls)
-        if cls.defining_methods & vars(cls).keys():
+        add_new_names_for_former_overrides(cls)
+        if cls.members_defining_equations & vars(cls).keys():
             base = next(kind for kind in cls.__mro__ if "derived_properties" in vars(kind))
-            for name in cls.derived_properties:
+            for name in cls.members_derived_from_equations:
                 if name not in vars(cls):
                     setattr(cls, name, vars(base)[name])
 
@@ -162,7 +162,7 @@ class Part:
         return ()
 
     @classmethod
-    def required_functions(cls) -> tuple[str, ...]:
+    def list_required_function_names(cls) -> tuple[str, ...]:
         """Return the names of the functions that the part must define.
 
         Returns
@@ -173,7 +173,7 @@ class Part:
         return ("auxiliary_rates", "auxiliary_steady_states") if cls.unknowns else ()
 
     @classmethod
-    def rejection_error(cls, name: str, value: Any) -> InvalidValue:
+    def build_field_rejection_error(cls, field_name: str, value: Any) -> InvalidValue:
         """Return the error for a field that belongs to another part.
 
         Parameters
@@ -188,12 +188,12 @@ class Part:
         InvalidValue
             Error whose message explains that the field does not apply to this part.
         """
-        where, instead = cls.rejection_hint
+        where, instead = cls.rejection_condition_and_remedy
         rule = f"does not apply {where or f'to {cls.name!r}'}"
-        remedy = f"Omit {name}, or {instead}." if instead else f"Omit {name}."
-        return InvalidValue(name, value, rule, remedy=remedy)
+        remedy = f"Omit {field_name}, or {instead}." if instead else f"Omit {field_name}."
+        return InvalidValue(field_name, value, rule, remedy=remedy)
 
-    def field_error(self, name: str, rule: str, remedy: str = "") -> InvalidValue:
+    def build_field_error(self, field_name: str, rule: str, remedy: str = "") -> InvalidValue:
         """Return the error for an invalid value of a field.
 
         Parameters
@@ -210,7 +210,7 @@ class Part:
         InvalidValue
             Error with the current value of the field.
         """
-        return InvalidValue(name, getattr(self, name), rule, remedy=remedy)
+        return InvalidValue(field_name, getattr(self, field_name), rule, remedy=remedy)
 
 
 @accept_former_keyword_names
@@ -357,7 +357,7 @@ def list_part_field_names(part_class: type[Part]) -> tuple[str, ...]:
         the order must not change.
     """
     names = (f.name for f in fields(part_class) if "about" in f.metadata)
-    return tuple(sorted(names, key=lambda name: name != part_class.selected_by))
+    return tuple(sorted(names, key=lambda name: name != part_class.selecting_field_name))
 
 
 @cache
@@ -477,7 +477,7 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
     return plain
 
 
-def discover_parts(package: str, package_path: Iterable[str]) -> dict[str, type[Part]]:
+def discover_parts(package_name: str, package_path: Iterable[str]) -> dict[str, type[Part]]:
     """Import the modules of a package and collect their parts.
 
     Parameters
@@ -496,7 +496,7 @@ def discover_parts(package: str, package_path: Iterable[str]) -> dict[str, type[
     for file in sorted(module.name for module in pkgutil.iter_modules(package_path)):
         if file.startswith("_"):  # These modules contain shared code.
             continue
-        module = importlib.import_module(f"{package}.{file}")
+        module = importlib.import_module(f"{package_name}.{file}")
         own = [p for p in vars(module).values() if isinstance(p, type) and issubclass(p, Part)]
         parts |= {p.name: p for p in own if p.__module__ == module.__name__}
     return parts

@@ -49,7 +49,7 @@ def build_motion_point_assembling_function(
     )
     effective_stress, stress = (
         friction_functions.effective_normal_stress,
-        friction_functions.rig_normal_stress,
+        friction_functions.measured_effective_normal_stress,
     )
     state_variable = friction_functions.state_variable
     pressure, imposed, imposed_change = (

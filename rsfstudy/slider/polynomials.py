@@ -59,7 +59,7 @@ def compute_resolvent_polynomials(
     return coefficients, terms[1:]
 
 
-def find_roots_with_one_distant_root(polynomial: PolynomialCoefficients) -> np.ndarray:
+def find_roots_with_one_very_large_root(polynomial: PolynomialCoefficients) -> np.ndarray:
     """Find the roots of a polynomial in which one root is very large.
 
     If the mass of the slider is small, one root is about 1e20 times larger than the other roots. If

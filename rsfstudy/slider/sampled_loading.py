@@ -254,7 +254,7 @@ class SampledHistory(UserLoading):
         return np.zeros(len(self.sample_table), dtype=bool)
 
     @property
-    def reported_segment_count(self) -> int:
+    def reported_segment_start_count(self) -> int:
         """Number of segments whose start is reported as an event.
 
         Only the end of the record is reported as an event, to avoid one event per sample.

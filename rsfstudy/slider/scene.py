@@ -318,14 +318,14 @@ class Scene(SceneFunctions, SceneQuantities):
         return Scene(self.parts._replace(loading=step))
 
     @property
-    def under_steady_loading(self) -> Scene:
+    def steadily_loaded_scene(self) -> Scene:
         """Scene with a steadily moving load point, for stability analyses.
 
         If the loading has unknowns or noise, the load point of the returned scene moves at the
         velocity of the last segment, without noise. Otherwise the property returns the scene
         itself.
         """
-        if not self.stress_loading.unknowns and not self.parts.loading_noise.is_active:
+        if not self.stress_imposing_part.unknowns and not self.parts.loading_noise.is_active:
             return self
         steady = self.with_segment(loading.Segment(self.load_velocity))
         return Scene(steady.parts._replace(loading_noise=NoNoise()))
@@ -351,7 +351,7 @@ class Scene(SceneFunctions, SceneQuantities):
         return Scene(self.parts._replace(loading=alone))
 
     @cached_attribute
-    def continuous_segments(self) -> tuple[tuple[Scene, np.ndarray], ...]:
+    def segment_sequences_without_jumps(self) -> tuple[tuple[Scene, np.ndarray], ...]:
         """Sequences of loading segments that follow each other without a jump.
 
         A jump is a sudden change in load point displacement or normal stress, or the end of a
@@ -360,7 +360,7 @@ class Scene(SceneFunctions, SceneQuantities):
         shape (segments, 6) with the rows of the segment table. The columns of the table are defined
         in ``parameter_layout``.
         """
-        if len(self._segments) == 1:
+        if len(self._loading_segments) == 1:
             return ((self, SINGLE_ENDLESS_SEGMENT_TABLE),)
         table, breaks = map(
             np.array, (self.parts.loading.segment_table, self.parts.loading.jump_mask)
@@ -375,7 +375,7 @@ class Scene(SceneFunctions, SceneQuantities):
     # ---- equations ------------------------------------------------------------------------------
 
     @cached_attribute
-    def cache(self) -> dict[tuple[Any, ...], Any]:
+    def result_cache(self) -> dict[tuple[Any, ...], Any]:
         """Cache for results that depend only on the scene."""
         return {}
 

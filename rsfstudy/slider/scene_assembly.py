@@ -160,8 +160,10 @@ def _group_values_by_part_index(
             if value is None or value is idle[name]:
                 continue
             owner = PART_CLASS_BY_FIELD_NAME[name]
-            if name != owner.selected_by or validate_field_value(owner, name, value):
-                raise field_index.rejecting_part_class_by_field[name].rejection_error(name, value)
+            if name != owner.selecting_field_name or validate_field_value(owner, name, value):
+                raise field_index.rejecting_part_class_by_field[name].build_field_rejection_error(
+                    name, value
+                )
         elif name not in PART_SLOT_NAMES:
             raise _build_unknown_field_error(name, value, field_index)
     return values
@@ -266,7 +268,7 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
         for other in slot.built_in_parts.values():
             for name in set(list_part_field_names(other)) - set(places):
                 refusing[name] = part
-                calls = name == other.selected_by
+                calls = name == other.selecting_field_name
                 idle[name] = other.__dataclass_fields__[name].default if calls else None
                 if not calls or slot.name in owned:
                     foreign.add(name)

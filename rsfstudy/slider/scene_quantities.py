@@ -31,7 +31,7 @@ class SceneQuantities(SceneBase):
             """Critical stiffness at V_*."""
 
     @cached_attribute
-    def _segments(self) -> tuple[Segment, ...]:
+    def _loading_segments(self) -> tuple[Segment, ...]:
         """Segments of the loading."""
         return self.parts.loading.segments
 
@@ -41,7 +41,7 @@ class SceneQuantities(SceneBase):
         return self.parts.dynamics
 
     @property
-    def stress_loading(self) -> Loading | Noise:
+    def stress_imposing_part(self) -> Loading | Noise:
         """Part whose unknowns impose stress.
 
         The part is the noise if the noise changes normal stress, and otherwise the loading.
@@ -64,7 +64,7 @@ class SceneQuantities(SceneBase):
         source is the fluid. If both the loading and the fluid have unknowns, the pressure source
         combines both parts. In the combination, the loading imposes the pressure around the fault.
         """
-        imposed, pores = self.stress_loading, self.parts.fluid
+        imposed, pores = self.stress_imposing_part, self.parts.fluid
         if not imposed.unknowns:
             return pores
         return FluidWithBoundaryPressure(imposed, pores) if pores.unknowns else imposed
@@ -142,7 +142,7 @@ class SceneQuantities(SceneBase):
     @cached_attribute
     def load_velocity(self) -> float:
         """Load point velocity after the last loading step, in V_*."""
-        return self._segments[-1].load_velocity
+        return self._loading_segments[-1].load_velocity
 
     @cached_attribute
     def log_load_velocity(self) -> float:
@@ -155,7 +155,7 @@ class SceneQuantities(SceneBase):
     @cached_attribute
     def imposed_normal_stress(self) -> float:
         """Total change in imposed normal stress after the last step, in sigma_*."""
-        return self._segments[-1].normal_stress
+        return self._loading_segments[-1].normal_stress
 
     @property
     def spring_stress_step(self) -> float:
@@ -163,7 +163,7 @@ class SceneQuantities(SceneBase):
 
         The change in spring stress is in units of :math:`\sigma_*`.
         """
-        return self.stiffness * self._segments[0].displacement
+        return self.stiffness * self._loading_segments[0].displacement
 
     @property
     def is_perturbed(self) -> bool:

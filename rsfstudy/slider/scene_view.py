@@ -25,11 +25,11 @@ class SceneView(Protocol):
         """Friction coefficient at the reference velocity."""
 
     @property
-    def under_steady_loading(self) -> SceneView:
+    def steadily_loaded_scene(self) -> SceneView:
         """Copy of the scene with a load point that moves steadily."""
 
     @property
-    def cache(self) -> dict[tuple[Any, ...], Any]:
+    def result_cache(self) -> dict[tuple[Any, ...], Any]:
         """Cache of functions decorated with ``cached_per_scene``."""
 
     @property
@@ -49,7 +49,7 @@ class SceneView(Protocol):
         """Dynamics of the slider."""
 
     @property
-    def stress_loading(self) -> Any:
+    def stress_imposing_part(self) -> Any:
         """Part whose unknowns impose stress: the noise or the loading."""
 
     @property

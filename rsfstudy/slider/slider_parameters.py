@@ -92,14 +92,14 @@ class SliderParameters(Part):
                 f"must exceed -mu_star = {-self.mu_star:g}, because the shear stress must be "
                 "positive"
             )
-            raise self.field_error("initial_stress", rule)
+            raise self.build_field_error("initial_stress", rule)
         if self.initial_state and scene.parts.law.state_count > 1:
             rule = (
                 f"does not apply to law={scene.parts.law.name!r}, because the law has several "
                 "state variables"
             )
             remedy = "Omit initial_state, and use a loading protocol to reach the initial state."
-            raise self.field_error("initial_state", rule, remedy)
+            raise self.build_field_error("initial_state", rule, remedy)
 
 
 #: Names of the two alternative fields for the stiffness.

@@ -28,7 +28,7 @@ from rsfstudy.slider.polynomials import (
     compute_resolvent_polynomials,
     evaluate_polynomial,
     find_positive_real_roots,
-    find_roots_with_one_distant_root,
+    find_roots_with_one_very_large_root,
     multiply_polynomials,
     split_even_and_odd_powers,
 )
@@ -45,7 +45,7 @@ _RELATIVE_GROWTH_RATE_ROUNDING_ERROR = 64.0 * 2.0**-52
 
 #: If the ratio of the two leading coefficients of the polynomial is below this limit, the mass of
 #: the slider is treated as small.
-_SMALL_MASS_COEFFICIENT_RATIO = 1e-6
+_MAX_COEFFICIENT_RATIO_OF_SMALL_MASS = 1e-6
 
 
 def compute_critical_stiffness(
@@ -83,7 +83,7 @@ def compute_critical_stiffness(
     ----------
     Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694.
     """
-    scene = scene.under_steady_loading
+    scene = scene.steadily_loaded_scene
     steady = compute_steady_sliding(scene, log_slip_rate)
     if steady is None:
         return math.nan
@@ -122,7 +122,7 @@ def compute_all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> 
     The critical stiffnesses are the values of :math:`K` at which the equation
     :math:`K (1 + w^2 p^2) + \eta V p + G(p) = 0` has an imaginary root.
     """
-    scene = scene.under_steady_loading
+    scene = scene.steadily_loaded_scene
     steady = compute_steady_sliding(scene, log_slip_rate)
     return (
         []
@@ -179,10 +179,10 @@ def _compute_growth_rates(
         [0.0, *linearised_balance.friction_response_numerator],
     )
     light = (
-        0.0 < abs(polynomial[-1]) < _SMALL_MASS_COEFFICIENT_RATIO * abs(polynomial[-2])
+        0.0 < abs(polynomial[-1]) < _MAX_COEFFICIENT_RATIO_OF_SMALL_MASS * abs(polynomial[-2])
         and linearised_balance.slip_rate_norm > 0.0
     )
-    roots = find_roots_with_one_distant_root(polynomial) if light else np.roots(polynomial[::-1])
+    roots = find_roots_with_one_very_large_root(polynomial) if light else np.roots(polynomial[::-1])
     return np.asarray(roots[np.argsort(-roots.real)])
 
 
@@ -215,7 +215,7 @@ def compute_linear_growth_rates(scene: SceneView, log_slip_rate: float) -> np.nd
     The growth rates are the roots of :math:`K (1 + w^2 p^2) + \eta V p + G(p) = 0` with
     :math:`w = V T/(2 \pi D_c)`. A small perturbation varies as :math:`\exp(p V t/D_c)`.
     """
-    scene = scene.under_steady_loading
+    scene = scene.steadily_loaded_scene
     return _compute_growth_rates(
         linearise_force_balance(scene, _compute_steady_sliding_or_raise(scene, log_slip_rate)),
         scene.stiffness,
@@ -267,12 +267,12 @@ def compute_largest_linear_growth_rate(
         derivatives of the law, and rounding errors. If steady sliding does not exist at this slip
         rate, the function returns None.
     """
-    scene = scene.under_steady_loading
+    scene = scene.steadily_loaded_scene
     steady = compute_steady_sliding(scene, log_slip_rate)
     if steady is None:
         return None
     slopes = compute_state_evolution_derivatives(scene, steady)
-    error = slopes.relative_error
+    error = slopes.max_relative_error_estimate
 
     def perturbed_growth_rates(part: float) -> np.ndarray:
         changed = slopes.with_perturbed_derivatives(part)
@@ -340,7 +340,7 @@ def compute_spring_response_to_normal_stress(
         remedy = "Set temperature='isothermal', or simulate the oscillation."
         name = scene.parts.temperature.name
         raise InvalidValue("temperature", name, "has no linear response", remedy=remedy)
-    still = scene.under_steady_loading
+    still = scene.steadily_loaded_scene
     steady = _compute_steady_sliding_or_raise(still, log_slip_rate)
     psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = (

@@ -55,7 +55,7 @@ def wrap_single_state_evolution_for_tuples(
 
 
 def compute_default_steady_state(
-    log_slip_rate: float, state_shift: float, p: FloatTuple
+    log_slip_rate: float, stress_induced_state_shift: float, p: FloatTuple
 ) -> FloatTuple:
     r"""Compute the default steady state of laws with one state.
 
@@ -73,7 +73,7 @@ def compute_default_steady_state(
     tuple of float
         State :math:`\Psi`. In steady sliding, :math:`\Theta = -b \ln(V/V_*)`.
     """
-    return (state_shift - p[B] * log_slip_rate,)
+    return (stress_induced_state_shift - p[B] * log_slip_rate,)
 
 
 def find_evolutions_and_steady_states_of_law(

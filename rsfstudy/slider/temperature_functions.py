@@ -37,10 +37,10 @@ from rsfstudy.slider.state_functions import (
 )
 
 #: Number of parameters that precede the parameters that the temperature part declares.
-_COMMON_TEMPERATURE_PARAMETER_COUNT = 3
+_PARAMETER_COUNT_BEFORE_PART_FIELDS = 3
 #: Smallest temperature, relative to T_*. Lower temperatures occur only in trial steps of the
 #: integrator.
-_MIN_TEMPERATURE_RATIO = 1e-3
+_MIN_TEMPERATURE_OVER_REFERENCE = 1e-3
 #: Limits of the effective normal stress, in sigma_*, that is computed from the friction
 #: coefficient. The limits are exceeded only in trial steps of the integrator.
 _MIN_NORMAL_STRESS, _MAX_NORMAL_STRESS = 1e-12, 1e12
@@ -141,7 +141,7 @@ def compute_inverse_temperature_change(temperature_rise: float) -> float:
     float
         Value of :math:`\Lambda = T_*/T - 1`.
     """
-    return -temperature_rise / max(1.0 + temperature_rise, _MIN_TEMPERATURE_RATIO)
+    return -temperature_rise / max(1.0 + temperature_rise, _MIN_TEMPERATURE_OVER_REFERENCE)
 
 
 def compute_derivatives_by_temperature(
@@ -162,7 +162,7 @@ def compute_derivatives_by_temperature(
         Derivatives with respect to :math:`\vartheta`, :math:`a q_a/(1 + \vartheta)^2` and
         :math:`b q_b/(1 + \vartheta)^2`.
     """
-    falling = max(1.0 + temperature_rise, _MIN_TEMPERATURE_RATIO) ** -2
+    falling = max(1.0 + temperature_rise, _MIN_TEMPERATURE_OVER_REFERENCE) ** -2
     return temperature_parameters[0] * falling, temperature_parameters[1] * falling
 
 
@@ -269,7 +269,7 @@ def _build_temperature_rate_function(
         temperature_indices.parameter_end_index,
     )
     own, state_sum = (
-        first + _COMMON_TEMPERATURE_PARAMETER_COUNT,
+        first + _PARAMETER_COUNT_BEFORE_PART_FIELDS,
         build_tuple_sum_function(law_state_count),
     )
 

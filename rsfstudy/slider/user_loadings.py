@@ -251,21 +251,21 @@ def _read_positive_number(declared_segment: Mapping[str, Any], key: str, rule: s
 
 
 def _build_validated_segment(
-    velocity: Any, step: Any, duration: Any, normal_stress: Any
+    velocity: Any, displacement_step: Any, duration: Any, normal_stress: Any
 ) -> Segment:
     """Return a ``Segment`` whose values have been validated."""
     if not _is_real_number(velocity) or not math.isfinite(velocity):
         remedy = "Use 0 to hold the load point."
         raise InvalidValue("velocity", velocity, "must be a finite number", remedy=remedy)
-    if not _is_real_number(step) or not math.isfinite(step):
-        raise InvalidValue("step", step, "must be a finite number")
+    if not _is_real_number(displacement_step) or not math.isfinite(displacement_step):
+        raise InvalidValue("step", displacement_step, "must be a finite number")
     if not _is_real_number(duration) or not duration > 0.0:
         remedy = "Remove segments with zero duration."
         raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
     if not _is_real_number(normal_stress) or not -1.0 < normal_stress < math.inf:
         rule = "must be greater than -1, because it is the imposed normal stress minus sigma_*"
         raise InvalidValue("normal_stress", normal_stress, rule)
-    return Segment(float(velocity), float(step), float(duration), float(normal_stress))
+    return Segment(float(velocity), float(displacement_step), float(duration), float(normal_stress))
 
 
 def _is_real_number(value: Any) -> bool:

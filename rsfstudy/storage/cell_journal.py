@@ -44,7 +44,7 @@ CREATE TABLE IF NOT EXISTS cells (
 """
 #: Query for database objects that rsfstudy does not create. For example, a trigger in the file
 #: could run whenever rsfstudy writes to the journal.
-_SQL_TO_FIND_FOREIGN_OBJECTS = """
+_SQL_TO_FIND_UNEXPECTED_OBJECTS = """
 SELECT type || ' ' || name FROM sqlite_master
 WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
@@ -95,8 +95,8 @@ class CellJournal:
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 if fresh:
-                    _remove_journal(path)
-            self._db = _open_locked_database(path or ":memory:")
+                    _remove_unused_journal(path)
+            self._db = _open_and_lock_database(path or ":memory:")
         except (OSError, sqlite3.Error) as error:
             raise self._build_unusable_journal_error(error) from error
         try:
@@ -127,7 +127,7 @@ class CellJournal:
         """
         with self._db:
             self._db.executescript(_SQL_TO_CREATE_TABLES)
-            others = self._db.execute(_SQL_TO_FIND_FOREIGN_OBJECTS).fetchall()
+            others = self._db.execute(_SQL_TO_FIND_UNEXPECTED_OBJECTS).fetchall()
             if others:
                 found = shorten_text(others[0][0])
                 raise DataError(
@@ -341,7 +341,7 @@ class CellWallTimes:
             return None
 
 
-def _open_locked_database(path: Path | str) -> sqlite3.Connection:
+def _open_and_lock_database(path: Path | str) -> sqlite3.Connection:
     """Open a database, and lock the database until it is closed."""
     db = sqlite3.connect(path, timeout=_JOURNAL_LOCK_TIMEOUT_SECONDS)
     try:
@@ -359,14 +359,14 @@ def _is_database_locked_error(error: Exception) -> bool:
     return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
 
 
-def _remove_journal(path: Path) -> None:
+def _remove_unused_journal(path: Path) -> None:
     """Delete a journal and its rollback file if no run uses the journal.
 
     If SQLite is interrupted while it writes the journal, a rollback file remains.
     """
     if path.exists():
         try:
-            _open_locked_database(path).close()
+            _open_and_lock_database(path).close()
         except sqlite3.Error as error:
             if _is_database_locked_error(error):
                 raise

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import format_list
+from rsfstudy.formatting import format_abbreviated_list
 
 
 def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) -> int:
@@ -47,7 +47,7 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
                 rule = f"must contain a value of {dimension}"
                 remedy = (
                     f"Pass one value for each axis (repeat --cell). The values of {dimension} are "
-                    f"{format_list(values.tolist(), ', ')}."
+                    f"{format_abbreviated_list(values.tolist(), ', ')}."
                 )
                 raise InvalidValue("cell", dict(coordinate_values), rule, remedy=remedy)
             index.append(0)

@@ -19,7 +19,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import DataError, shorten_text
-from rsfstudy.quantities import read_units_or_scale
+from rsfstudy.quantities import read_units_or_reference_scale
 
 #: Name of the attribute that contains the digest of the contents.
 CONTENT_DIGEST_ATTRIBUTE = "content_digest"
@@ -104,7 +104,7 @@ def _compute_variable_and_attribute_digests(dataset: xr.Dataset) -> dict[str, st
         f"attribute {name}": f"text {_hash_bytes(text.encode())}" for name, text in texts.items()
     }
     for name, values in dataset.variables.items():
-        form = f"{dict(values.sizes)} {read_units_or_scale(values.attrs)}"
+        form = f"{dict(values.sizes)} {read_units_or_reference_scale(values.attrs)}"
         found[str(name)] = f"{form} {_hash_bytes(_convert_array_to_portable_bytes(values.values))}"
     return found
 

@@ -248,7 +248,7 @@ def read_dataset(path: Path) -> xr.Dataset:
     """
     where = shorten_text(path)
     try:
-        _check_readable_path(path, where)
+        _check_is_file_or_zarr_store(path, where)
         if path.is_dir():
             _check_zarr_codecs(path)
             sealed = _check_zarr_store_digest(path)
@@ -280,7 +280,7 @@ def read_dataset(path: Path) -> xr.Dataset:
     return dataset
 
 
-def _check_readable_path(path: Path, file_description: str) -> None:
+def _check_is_file_or_zarr_store(path: Path, file_description: str) -> None:
     """Raise ``DataError`` unless a path is a regular file or a Zarr store.
 
     The check is needed because opening a pipe could block forever.

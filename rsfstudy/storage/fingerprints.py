@@ -15,7 +15,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from rsfstudy.formatting import format_list
+from rsfstudy.formatting import format_abbreviated_list
 
 #: Name of the entry that contains the code digests of modules.
 _CODE_DIGESTS_KEY = "physics"
@@ -50,7 +50,7 @@ def find_fingerprint_differences(
             names = sorted(name for name in code.keys() & other if code[name] != other[name])
             if names:
                 changed = {name: code[name] for name in names}
-                fingerprint[f"{_CODE_DIGESTS_KEY} ({format_list(names, ', ')})"] = (
+                fingerprint[f"{_CODE_DIGESTS_KEY} ({format_abbreviated_list(names, ', ')})"] = (
                     _combine_code_digests(changed)
                 )
         elif isinstance(code, dict):  # An older fingerprint contains one digest of all modules.

@@ -98,11 +98,11 @@ class LatticeCoordinatesBuilder:
             coords |= _build_coordinates_along_axis(
                 study, axis, [fields[number] for number in cells]
             )
-        for name, units in study.units.items():
+        for name, units in study.axis_field_units.items():
             of_axis = {key: v for key, v in coords[name][2].items() if key != "scale"}
             coords[name] = (*coords[name][:2], of_axis | {"units": units})
         scales = (
-            study.axis_unit_converter.compute_scale_and_field_coordinates()
+            study.axis_unit_converter.compute_scale_and_scene_coordinates()
             if study.axis_unit_converter
             else {}
         )
@@ -112,7 +112,7 @@ class LatticeCoordinatesBuilder:
             )
             coords[name] = (dims, values, about)
         stored = [scene.stored_fields() for scene in scenes_by_cell_number.values()]
-        for name in study.scene_fields:
+        for name in study.all_scene_field_names:
             present = {scene.get(name) for scene in stored} - {None}
             if name not in {*coords, *study.measure.variables} and len(present) == 1:
                 value = present.pop()
@@ -125,7 +125,7 @@ class LatticeCoordinatesBuilder:
 
 
 def _build_coordinates_along_axis(
-    study: Study, axis: Axis, fields_of_points: list[dict[str, Any]]
+    study: Study, axis: Axis, scene_fields_of_points: list[dict[str, Any]]
 ) -> dict[str, Any]:
     """Build the dimension coordinate of an axis, and the coordinates of its fields."""
     coords: dict[str, Any] = {}
@@ -140,7 +140,7 @@ def _build_coordinates_along_axis(
     # use these values.
     points: list[AxisPointFieldValues] = [
         {**study.measure.plain_fields, **fields, **row}
-        for fields, row in zip(fields_of_points, axis.rows, strict=True)
+        for fields, row in zip(scene_fields_of_points, axis.rows, strict=True)
     ]
     for name in axis.fields:
         varied = [point.get(name) for point in points]

@@ -33,7 +33,7 @@ _COMMENT_ON_RIG_UNITS = (
 )
 #: Names of the root attributes that users can set with environment variables. For example, the
 #: variable ``RSFSTUDY_LICENSE`` sets the attribute ``license``.
-_ROOT_ATTRIBUTES_FROM_ENVIRONMENT = (
+_ROOT_ATTRIBUTES_FROM_ENV_VARIABLES = (
     "creator_name",
     "creator_email",
     "institution",
@@ -167,7 +167,7 @@ def build_root_attributes(
         "provenance": json.dumps(dict(provenance)),
         **{
             name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated")
-            for name in _ROOT_ATTRIBUTES_FROM_ENVIRONMENT
+            for name in _ROOT_ATTRIBUTES_FROM_ENV_VARIABLES
         },
     }
     # The command line and environment variables may contain bytes that are not valid text.

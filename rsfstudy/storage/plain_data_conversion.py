@@ -79,7 +79,7 @@ def convert_plain_data(plain_data: Any, annotated_type: Any, path_in_file: str) 
 
 
 @cache
-def create_struct_type(name: str, type_by_field: tuple[tuple[str, Any], ...]) -> Any:
+def create_msgspec_struct_type(name: str, type_by_field: tuple[tuple[str, Any], ...]) -> Any:
     """Create a struct that has only required fields and rejects unknown fields.
 
     Parameters
@@ -101,7 +101,7 @@ def build_dataclass_from_plain_data(
     plain_data: Any,
     dataclass_type: Any,
     path_in_file: str,
-    given_fields: Mapping[str, Any] = MappingProxyType({}),
+    preset_field_values: Mapping[str, Any] = MappingProxyType({}),
     integer_type: Any = int,
 ) -> Any:
     """Build an instance of a dataclass from plain data.
@@ -133,10 +133,12 @@ def build_dataclass_from_plain_data(
     types = tuple(
         (field.name, integer_type if hints[field.name] is int else hints[field.name])
         for field in fields(dataclass_type)
-        if field.name not in given_fields
+        if field.name not in preset_field_values
     )
     values = convert_plain_field_values(plain_data, types, path_in_file)
-    return construct_from_field_values(dataclass_type, {**values, **given_fields}, path_in_file)
+    return construct_from_field_values(
+        dataclass_type, {**values, **preset_field_values}, path_in_file
+    )
 
 
 def convert_plain_field_values(
@@ -163,7 +165,7 @@ def convert_plain_field_values(
     DataError
         If a field is missing, unknown or invalid.
     """
-    struct = create_struct_type("Stored", type_by_field)
+    struct = create_msgspec_struct_type("Stored", type_by_field)
     return msgspec.structs.asdict(convert_plain_data(plain_data, struct, path_in_file))
 
 

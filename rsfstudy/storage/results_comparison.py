@@ -175,16 +175,16 @@ class ResultsComparison:
         Reason why a variable is not compared, by name of the variable.
     """
 
-    declaration: Mapping[str, ValuesInBothDatasets]
-    origin: Mapping[str, ValuesInBothDatasets]
+    differing_declaration_entries: Mapping[str, ValuesInBothDatasets]
+    differing_provenance: Mapping[str, ValuesInBothDatasets]
     differing_axis_points: Mapping[str, tuple[list[Any], list[Any]]]
     finished_cell_counts: tuple[int, int, int]
-    statuses: pd.DataFrame
+    differing_statuses: pd.DataFrame
     agreement_table: pd.DataFrame
     uncompared_variables: Mapping[str, str]
 
     @property
-    def beyond_errors(self) -> list[str]:
+    def variables_beyond_errors(self) -> list[str]:
         """Names of variables whose difference exceeds the sum of both error estimates."""
         return list(self.agreement_table["variable"][self.agreement_table["beyond_errors"] > 0])
 
@@ -195,7 +195,11 @@ class ResultsComparison:
         The datasets agree if at least one cell is finished in both datasets, if these cells have
         the same statuses, and if no variable differs by more than the sum of both error estimates.
         """
-        return self.finished_cell_counts[0] > 0 and self.statuses.empty and not self.beyond_errors
+        return (
+            self.finished_cell_counts[0] > 0
+            and self.differing_statuses.empty
+            and not self.variables_beyond_errors
+        )
 
 
 def compare_results(first: xr.Dataset, second: xr.Dataset) -> ResultsComparison:
@@ -241,7 +245,7 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> ResultsComparison:
     known = _find_finished_cells(shared[0]) & _find_finished_cells(shared[1])
     alone = [int(_find_finished_cells(dataset).sum() - known.sum()) for dataset in both]
     return ResultsComparison(
-        declaration=find_fingerprint_differences(
+        differing_declaration_entries=find_fingerprint_differences(
             *(
                 dict(
                     _flatten_declaration(
@@ -251,12 +255,12 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> ResultsComparison:
                 for d in both
             )
         ),
-        origin=find_fingerprint_differences(
+        differing_provenance=find_fingerprint_differences(
             *(_read_versions_and_machine(dataset) for dataset in both)
         ),
         differing_axis_points=points,
         finished_cell_counts=(int(known.sum()), alone[0], alone[1]),
-        statuses=_compare_statuses_of_shared_cells(shared, known),
+        differing_statuses=_compare_statuses_of_shared_cells(shared, known),
         agreement_table=_compare_variables_of_shared_cells(shared),
         uncompared_variables=left_out,
     )

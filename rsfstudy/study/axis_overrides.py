@@ -9,7 +9,7 @@ from typing import Any
 
 from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import format_value, is_sequence_of_axis_values
+from rsfstudy.formatting import format_number_or_text, is_sequence_of_axis_values
 
 
 def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
@@ -116,7 +116,7 @@ def replace_field_values(axis: Axis, field_name: str, new_values: Sequence[Any])
                     field_name,
                     row[field_name],
                     value,
-                    value_identifies_point=len(others) == 1,
+                    new_value_identifies_point=len(others) == 1,
                 )
                 while new in points or new in axis.labels:
                     new = f"{label}, {new}"
@@ -130,7 +130,7 @@ def _convert_row_to_hashable_key(axis_row: AxisPointFieldValues) -> frozenset[tu
 
 
 def _relabel_overridden_point(
-    label: str, field_name: str, old_value: Any, new_value: Any, *, value_identifies_point: bool
+    label: str, field_name: str, old_value: Any, new_value: Any, *, new_value_identifies_point: bool
 ) -> str:
     """Return the label of a point after the value of one field has changed.
 
@@ -139,23 +139,23 @@ def _relabel_overridden_point(
     identifies the point (``value_identifies_point``), the label is replaced by the new value, as in
     ``"alpha = 0.3"``. In all other cases, text such as ``"alpha = 0.3"`` is appended to the label.
     """
-    text = f"{field_name} = {_format_with_all_digits(new_value)}"
-    old_text = re.escape(_format_with_all_digits(old_value))
+    text = f"{field_name} = {_format_without_rounding(new_value)}"
+    old_text = re.escape(_format_without_rounding(old_value))
     stated = rf"(?<!\w){re.escape(field_name)} = {old_text}(?![\w.])"
     replaced, count = re.subn(stated, lambda _found: text, label)
     if count:
         return replaced
-    return text if value_identifies_point else f"{label}, {text}"
+    return text if new_value_identifies_point else f"{label}, {text}"
 
 
-def _format_with_all_digits(value: Any) -> str:
+def _format_without_rounding(value: Any) -> str:
     """Format a value with six digits, or with all digits if rounding changes it."""
-    short_text = format_value(value)
+    short_text = format_number_or_text(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text
 
 
-def convert_to_plain_values(field_name: str, value_or_list: Any) -> Any:
+def convert_field_values_to_plain_data(field_name: str, value_or_list: Any) -> Any:
     """Convert a field value, or a list of field values, to plain data.
 
     Parameters

@@ -9,7 +9,10 @@ from typing import Any, ClassVar
 import pandas as pd
 
 from rsfstudy.errors import escape_control_characters
-from rsfstudy.former_data_names import NEW_VERDICT_COLUMN_BY_FORMER_COLUMN, TableWithFormerColumns
+from rsfstudy.former_data_names import (
+    NEW_VERDICT_COLUMN_BY_FORMER_COLUMN,
+    TableAcceptingFormerColumnNames,
+)
 from rsfstudy.quantities import HtmlMarkup
 
 _INEQUALITY_SIGN_BY_RELATION = {"equals": "", "below": "< ", "above": "> "}
@@ -72,7 +75,7 @@ def _format_aligned_table(rows: list[dict[str, str]]) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-class ClaimVerdictTable(TableWithFormerColumns):
+class ClaimVerdictTable(TableAcceptingFormerColumnNames):
     """Table of the verdicts on claims, with one row per claim.
 
     Selections from the table are ordinary data frames.

@@ -201,7 +201,7 @@ class Claim:
         """
         return {**asdict(self), "where": dict(self.where), "baseline": dict(self.baseline)}
 
-    def check_selection(self, dataset: xr.Dataset) -> None:
+    def check_applies_to_dataset(self, dataset: xr.Dataset) -> None:
         """Check that the claim applies to a dataset.
 
         Parameters

@@ -13,11 +13,11 @@ import numpy as np
 
 from rsfstudy.axes import Axis
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import format_list, format_value
+from rsfstudy.formatting import format_abbreviated_list, format_number_or_text
 from rsfstudy.measures import RESERVED_NAMES, Measure
 from rsfstudy.motion import Accuracy
 from rsfstudy.quantities import is_valid_variable_name
-from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
+from rsfstudy.rig import Rig, RigAxes, RigAxesToScenesConverter
 from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study.claims import Claim
 from rsfstudy.study.reductions.reduction_application import Reduction
@@ -162,7 +162,7 @@ def check_axis_fields_and_units(
     measure: Measure,
     axes: Sequence[Axis],
     scene_field_names: Sequence[str],
-    axis_unit_converter: LatticeScenesOnRig | None,
+    axis_unit_converter: RigAxesToScenesConverter | None,
 ) -> None:
     """Raise InvalidValue if an axis has unknown fields or unexpected units.
 
@@ -206,7 +206,7 @@ def check_axis_fields_and_units(
 
 
 def check_outputs_are_same_in_all_cells(
-    measure: Measure, measure_field_changes: Iterable[Mapping[str, Any]]
+    measure: Measure, measure_field_changes_of_cells: Iterable[Mapping[str, Any]]
 ) -> None:
     """Raise InvalidValue if the cells of a study have different result variables.
 
@@ -225,7 +225,7 @@ def check_outputs_are_same_in_all_cells(
         If the measure computes different variables in different cells.
     """
     given = _describe_measure_outputs(measure)
-    for changed in (measure.with_(**values) for values in measure_field_changes):
+    for changed in (measure.with_(**values) for values in measure_field_changes_of_cells):
         if _describe_measure_outputs(changed) != given:
             present = measure.plain_fields.items()
             guilty = [n for n, v in changed.plain_fields.items() if (n, v) not in present]
@@ -281,12 +281,12 @@ def check_field_is_set_at_all_axis_points(
             or field_name in SceneFields.find_inapplicable_fields(held, user_parts.values())
         ):
             continue
-        some = format_list(stating, ", ")
+        some = format_abbreviated_list(stating, ", ")
         rule = (
             f"is set only at some points of {axis.dimension} ({some}). The override would not "
             f"change the value at {point}, "
         )
-        rule += f"which is {format_value(held[field_name])}"
+        rule += f"which is {format_number_or_text(held[field_name])}"
         remedy = (
             f"Also select points that set the field, for example '{axis.dimension}={stating[0]}'."
         )
@@ -320,7 +320,7 @@ def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
 
 
 def build_unknown_name_error(
-    argument_name: str, unknown_name: str, violated_rule: str, known_names: Collection[str]
+    argument_name: str, unknown_name: str, violated_rule_text: str, known_names: Collection[str]
 ) -> InvalidValue:
     """Create the error for an unknown name.
 
@@ -345,7 +345,7 @@ def build_unknown_name_error(
     return InvalidValue(
         argument_name,
         unknown_name,
-        violated_rule,
+        violated_rule_text,
         remedy=remedy,
         choices=() if remedy else known_names,
     )

@@ -204,7 +204,7 @@ class Figure:
         return {name for name in named if isinstance(name, str)}
 
 
-def horizontal_line(height: float, **style: Any) -> DrawFunction:
+def build_horizontal_line_overlay(y_position: float, **style: Any) -> DrawFunction:
     """Create an overlay that draws a horizontal line.
 
     Parameters
@@ -220,12 +220,12 @@ def horizontal_line(height: float, **style: Any) -> DrawFunction:
         Function ``draw(dataset, axes)``.
     """
     thin = {"color": "0.6", "linewidth": 0.8, "linestyle": "-", "zorder": 0}
-    return lambda _dataset, axes: axes.axhline(height, **thin | style)
+    return lambda _dataset, axes: axes.axhline(y_position, **thin | style)
 
 
-def reference_line(
+def build_reference_line_overlay(
     x_variable: str,
-    function: Callable[[Any], Any],
+    y_function: Callable[[Any], Any],
     legend_label: str,
     min_x: float | None = None,
     **style: Any,
@@ -257,12 +257,12 @@ def reference_line(
         low = low if min_x is None else min_x
         at = np.linspace(low, high + 0.03 * (high - low), 200)
         wide = {"color": "0.8", "linewidth": 2.2, "linestyle": "-", "zorder": 1.5}
-        axes.plot(at, function(at), label=legend_label, **wide | style)
+        axes.plot(at, y_function(at), label=legend_label, **wide | style)
 
     return draw_line
 
 
-def get_figure_name_for_declaration(plot: Any, study_name: str) -> str:
+def get_figure_name_for_declaration(figure_or_name: Any, study_name: str) -> str:
     """Return the name by which a study declaration refers to a figure.
 
     Parameters
@@ -278,12 +278,16 @@ def get_figure_name_for_declaration(plot: Any, study_name: str) -> str:
         If ``plot`` is a `Figure`, the name of the study. If ``plot`` is a string, the string
         itself. Otherwise, the name of the function or module.
     """
-    if isinstance(plot, Figure):
+    if isinstance(figure_or_name, Figure):
         return study_name
-    return plot if isinstance(plot, str) else str(plot.__name__).rpartition(".")[2]
+    return (
+        figure_or_name
+        if isinstance(figure_or_name, str)
+        else str(figure_or_name.__name__).rpartition(".")[2]
+    )
 
 
-def check_is_figure(plot: Any) -> None:
+def check_is_figure(figure_or_name: Any) -> None:
     """Raise InvalidValue if an object is not a figure.
 
     Parameters
@@ -297,20 +301,22 @@ def check_is_figure(plot: Any) -> None:
         If the object cannot draw a figure, or if a user-defined function or module has the name of
         a figure of the package.
     """
-    if isinstance(plot, str):
-        Axis.check_storable_text("plot", plot)
+    if isinstance(figure_or_name, str):
+        Axis.check_storable_text("plot", figure_or_name)
         return
-    if isinstance(plot, Figure):
+    if isinstance(figure_or_name, Figure):
         return
-    if not hasattr(plot, "__name__") or not callable(getattr(plot, "draw", plot)):
+    if not hasattr(figure_or_name, "__name__") or not callable(
+        getattr(figure_or_name, "draw", figure_or_name)
+    ):
         rule = (
             "must be a figure name, a Figure, or a user-defined function or module that "
             "draws a figure"
         )
         raise InvalidValue(
-            "plot", plot, rule, remedy="Define, for example, def name(dataset, axes): ..."
+            "plot", figure_or_name, rule, remedy="Define, for example, def name(dataset, axes): ..."
         )
-    name = get_figure_name_for_declaration(plot, "")
+    name = get_figure_name_for_declaration(figure_or_name, "")
     if not is_valid_variable_name(name):
         rule = "must have a name that is a Python identifier"
         raise InvalidValue("plot", name, rule, remedy="Define the figure with def.")

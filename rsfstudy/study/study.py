@@ -25,11 +25,11 @@ from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.measures import Measure
 from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.quantities import Quantity
-from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
+from rsfstudy.rig import Rig, RigAxes, RigAxesToScenesConverter
 from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study import declaration_checks
 from rsfstudy.study.axis_overrides import (
-    convert_to_plain_values,
+    convert_field_values_to_plain_data,
     replace_field_values,
     select_axis_points,
 )
@@ -171,17 +171,25 @@ class Study:
         declaration_checks.check_study_field_types(vars(self))
         if self.rig is not None:
             object.__setattr__(
-                self, "axes", [RigAxes.convert_axis_to_stated_units(axis) for axis in self.axes]
+                self,
+                "axes",
+                [RigAxes.convert_axis_values_to_axis_units(axis) for axis in self.axes],
             )
         declaration_checks.check_name_clashes(self.measure, self.reductions, self.axes)
         declaration_checks.check_user_field_names_are_unused(
-            self.measure, self.reductions, self.scene_fields
+            self.measure, self.reductions, self.all_scene_field_names
         )
         declaration_checks.check_axis_fields_and_units(
-            self.measure, self.axes, self.scene_fields, self.axis_unit_converter
+            self.measure, self.axes, self.all_scene_field_names, self.axis_unit_converter
         )
-        varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self.scene_field_names]
-        changes = (self.split_rows(rows)[1] for rows in itertools.product(*varied))
+        varied = [
+            axis.rows
+            for axis in self.axes
+            if not set(axis.fields) <= self.scene_and_rig_field_names
+        ]
+        changes = (
+            self.split_scene_and_measure_fields(rows)[1] for rows in itertools.product(*varied)
+        )
         declaration_checks.check_outputs_are_same_in_all_cells(self.measure, changes)
         declaration_checks.check_axes_are_distinct(self.axes)
         for name, value in self.describe().items():
@@ -236,44 +244,44 @@ class Study:
         return dict(sorted(parts.items()))
 
     @cached_property
-    def user_classes(self) -> tuple[type | UserPart, ...]:
+    def user_defined_classes(self) -> tuple[type | UserPart, ...]:
         """Classes of the measure, user-defined parts and the user-defined stepper.
 
         The provenance of the results contains a digest of the code of all classes in this tuple.
         """
         return (
-            *self.measure.code_classes,
+            *self.measure.result_determining_classes,
             *self.user_parts.values(),
             *Engine.find_user_stepper(self.accuracy.engine),
         )
 
     @cached_property
-    def scene_fields(self) -> tuple[str, ...]:
+    def all_scene_field_names(self) -> tuple[str, ...]:
         """Names of all scene fields, including fields of user-defined parts."""
         return tuple(SceneFields.collect_quantities_with_user_parts(self.user_parts.values()))
 
     @cached_property
-    def scene_field_names(self) -> frozenset[str]:
+    def scene_and_rig_field_names(self) -> frozenset[str]:
         """Names of all fields that determine the scene of a cell.
 
         If the study has a rig, the set also contains the axis fields that have units.
         """
-        return frozenset({*self.scene_fields, *self.units})
+        return frozenset({*self.all_scene_field_names, *self.axis_field_units})
 
     @cached_property
-    def axis_unit_converter(self) -> LatticeScenesOnRig | None:
+    def axis_unit_converter(self) -> RigAxesToScenesConverter | None:
         """Object that converts axis values with units to scene fields.
 
         The property is None if the study has no rig.
         """
-        return LatticeScenesOnRig(self.rig, self.base, self.axes) if self.rig else None
+        return RigAxesToScenesConverter(self.rig, self.base, self.axes) if self.rig else None
 
     @cached_property
-    def units(self) -> dict[str, str]:
+    def axis_field_units(self) -> dict[str, str]:
         """Units of the axis fields that have units."""
         return {name: units for axis in self.axes for name, units in axis.units.items()}
 
-    def scene_fields_of_row(self, axis_row: AxisPointFieldValues) -> AxisPointFieldValues:
+    def convert_row_to_scene_fields(self, axis_row: AxisPointFieldValues) -> AxisPointFieldValues:
         """Convert the axis values of a cell to scene fields.
 
         Parameters
@@ -332,7 +340,7 @@ class Study:
             If the fields of a cell do not form a valid scene, or if a field of an axis has no
             effect in any cell. The message contains the position of the cell on the axes.
         """
-        unused = {n for axis in self.axes for n in axis.fields if n in self.scene_fields}
+        unused = {n for axis in self.axes for n in axis.fields if n in self.all_scene_field_names}
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
             cell = self._build_cell(rows)
             unused = {name for name in unused if cell.scene.as_dict().get(name) is None}
@@ -360,7 +368,7 @@ class Study:
         """
         return self._build_cell(self._find_axis_rows_of_cell(number))
 
-    def cell_changes(self, number: int) -> CellFieldChanges:
+    def compute_cell_field_changes(self, number: int) -> CellFieldChanges:
         """Compute the field values that the axes change in one cell.
 
         This method does not build a scene, so it is faster than `cell`.
@@ -375,7 +383,7 @@ class Study:
         CellFieldChanges
             Changed fields of the base scene and of the measure.
         """
-        return self._compute_cell_changes(self._find_axis_rows_of_cell(number))
+        return self._compute_field_changes_from_rows(self._find_axis_rows_of_cell(number))
 
     def _find_axis_rows_of_cell(self, cell_number: int) -> list[AxisPointFieldValues]:
         """Return the field values that each axis sets in a cell."""
@@ -407,7 +415,7 @@ class Study:
         """
         return self.cell(number).scene
 
-    def describe_cell(self, cell: int) -> str:
+    def describe_cell(self, cell_number: int) -> str:
         """Describe the position of a cell on the axes.
 
         Parameters
@@ -420,10 +428,10 @@ class Study:
         str
             Description, such as ``"phi = 60, b_over_a = 3"``.
         """
-        at = zip(self.axes, np.unravel_index(cell, self.shape), strict=True)
+        at = zip(self.axes, np.unravel_index(cell_number, self.shape), strict=True)
         return ", ".join(f"{axis.dimension} = {axis.point_names[i]}" for axis, i in at)
 
-    def split_rows(
+    def split_scene_and_measure_fields(
         self, axis_rows: Sequence[AxisPointFieldValues]
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Separate the fields of the scene from the fields of the measure.
@@ -443,7 +451,7 @@ class Study:
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
         for row in axis_rows:
             for name, value in row.items():
-                split[name not in self.scene_field_names][name] = value
+                split[name not in self.scene_and_rig_field_names][name] = value
         return split
 
     @cached_property
@@ -452,7 +460,7 @@ class Study:
         return self.base.as_dict()
 
     @cached_property
-    def _inapplicable_base_fields(self) -> frozenset[str]:
+    def _inapplicable_base_scene_fields(self) -> frozenset[str]:
         """Fields that do not apply to the parts of the base scene.
 
         The set is valid for cells in which no axis selects a part.
@@ -462,13 +470,17 @@ class Study:
             SceneFields.replace_names_by_user_parts(self._base_scene_fields, parts), parts.values()
         )
 
-    def _compute_cell_changes(self, axis_rows: Sequence[AxisPointFieldValues]) -> CellFieldChanges:
+    def _compute_field_changes_from_rows(
+        self, axis_rows: Sequence[AxisPointFieldValues]
+    ) -> CellFieldChanges:
         """Compute the changed fields of the cell at the given axis points."""
-        given, of_measure = self.split_rows(axis_rows)
-        of_scene = self.scene_fields_of_row(given)
+        given, of_measure = self.split_scene_and_measure_fields(axis_rows)
+        of_scene = self.convert_row_to_scene_fields(given)
         if _PART_SELECTING_FIELDS.isdisjoint(of_scene) and _PART_SELECTING_FIELDS.isdisjoint(given):
             kept = {
-                n: value for n, value in of_scene.items() if n not in self._inapplicable_base_fields
+                n: value
+                for n, value in of_scene.items()
+                if n not in self._inapplicable_base_scene_fields
             }
             return CellFieldChanges(kept, of_measure)
         # If a row selects a part and also sets a field without a meaning for this part, the field
@@ -488,7 +500,7 @@ class Study:
     def _build_cell(self, axis_rows: Sequence[AxisPointFieldValues]) -> Cell:
         """Build the cell at the given axis points."""
         try:
-            return self._compute_cell_changes(axis_rows).build_cell(self.base)
+            return self._compute_field_changes_from_rows(axis_rows).build_cell(self.base)
         except InvalidValue as error:
             place = ", ".join(
                 f"{name}={value!r}" for row in axis_rows for name, value in row.items()
@@ -538,7 +550,7 @@ class Study:
         """
         study, given = (
             self,
-            {name: convert_to_plain_values(name, v) for name, v in overrides.items()},
+            {name: convert_field_values_to_plain_data(name, v) for name, v in overrides.items()},
         )
         # User-defined parts are replaced first, because they may define the fields of other
         # overrides.
@@ -565,7 +577,9 @@ class Study:
             if changed := self._override_values_of_axis(axis, field_name, values):
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
         of_rig = units is not None
-        known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
+        known = dict.fromkeys(
+            (*self.dimensions, *self.all_scene_field_names, *self.measure.plain_fields)
+        )
         if (
             field_name not in known
             and not of_rig
@@ -583,7 +597,7 @@ class Study:
         if self.rig is not None and of_rig:
             rig, base = RigAxes.replace_rig_quantity(self.rig, self.base, field_name, value)
             return replace(self, rig=rig, base=base)
-        if field_name in self.scene_field_names | SceneFields.PART_SLOT_NAMES:
+        if field_name in self.scene_and_rig_field_names | SceneFields.PART_SLOT_NAMES:
             changes = SceneFields.replace_names_by_user_parts({field_name: value}, self.user_parts)
             return replace(self, base=self.base.with_(**changes))
         return replace(self, measure=self.measure.with_(**{field_name: value}))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rsfstudy.axes import Axis
-from rsfstudy.formatting import format_list
+from rsfstudy.formatting import format_abbreviated_list
 from rsfstudy.measures import Measure
 from rsfstudy.quantities import HtmlMarkup, Quantity, format_quantities_as_html_table
 from rsfstudy.slider import Scene, SceneFields
@@ -75,4 +75,4 @@ def _find_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) ->
 
 def _format_axis_points(axis: Axis) -> str:
     """Format the points of an axis, and shorten long lists."""
-    return f"{format_list(axis.point_names, ', ')} ({len(axis)})"
+    return f"{format_abbreviated_list(axis.point_names, ', ')} ({len(axis)})"

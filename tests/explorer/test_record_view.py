@@ -14,9 +14,9 @@ FIT = {"laws": ["slowness"], "stiffness": "0.04 MPa/um"}
 def test_the_code_of_a_record_in_memory_uses_the_record():
     record = rsfstudy.read_record(STEP, **READING)
     view = RecordView.create_with_widget_state(record, FIT | {"end": 130.0, "after": "60 um"})
-    assert view.write_command_line().startswith("#")
+    assert view.format_equivalent_command_line().startswith("#")
     variables = {"record": record}
-    exec(view.write_python_code(), variables)
+    exec(view.format_equivalent_python_code(), variables)
     assert variables["record"].time[-1] == 130.0
     assert variables["fit"].sizes["law"] == 1
 
@@ -28,7 +28,7 @@ def test_a_record_of_slip_is_read_with_the_stiffness(tmp_path):
     columns = {"Time (s)": record.time, "Slip (um)": slip, "Friction": record.columns["friction"]}
     pd.DataFrame(columns).to_csv(path, index=False)
     view = RecordView.create_with_widget_state(path, {"stiffness": "2e-3 1/um", "after": "60 um"})
-    reading = view.write_python_code().partition("fit = ")[0]
+    reading = view.format_equivalent_python_code().partition("fit = ")[0]
     variables = {}
     exec(reading, variables)
     moved = variables["record"].columns["displacement"]

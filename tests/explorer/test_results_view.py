@@ -12,10 +12,10 @@ from rsfstudy.explorer.curve_and_map_data import (
     convert_mathtext_to_unicode,
     extract_curves_of_panel,
     extract_map_of_panel,
-    find_cells_to_mark,
+    find_cells_to_mark_with_status,
     sample_map_at_pixels,
 )
-from rsfstudy.explorer.plot_selections import complete_selection
+from rsfstudy.explorer.plot_selections import complete_plot_selection
 from rsfstudy.explorer.results_view import ResultsView
 from rsfstudy.measures import VelocityStep
 from rsfstudy.status import Status
@@ -24,10 +24,10 @@ VARIABLE = "critical_velocity_ratio"
 
 
 def test_selections_resolve_contradictions(results):
-    chosen = complete_selection(results, x="law", second="law", facet="law")
+    chosen = complete_plot_selection(results, x="law", second="law", facet="law")
     assert (chosen.x, chosen.second) == ("law", "b_over_a")
     assert chosen.points == {"stiffness_ratio": 0}
-    chosen = complete_selection(results, kind="map", facet="law")
+    chosen = complete_plot_selection(results, kind="map", facet="law")
     assert {chosen.x, chosen.second} == {"stiffness_ratio", "b_over_a"}
     assert (chosen.facet, chosen.points) == ("law", {})
 
@@ -50,7 +50,7 @@ def test_an_invalid_state_is_refused(results, setting, message):
 
 
 def test_curves_have_errors_statuses_and_cells(results):
-    panel = complete_selection(results, second="law", points={"stiffness_ratio": 1})
+    panel = complete_plot_selection(results, second="law", points={"stiffness_ratio": 1})
     for law, curve in enumerate(extract_curves_of_panel(results, panel)):
         part = results.isel(law=law, stiffness_ratio=1)
         assert curve.label == ["slip law", "slowness law"][law]
@@ -61,7 +61,7 @@ def test_curves_have_errors_statuses_and_cells(results):
 
 
 def test_a_map_finds_the_cell_at_a_position(results):
-    chosen = complete_selection(results.isel(b_over_a=[2, 0, 3, 1]), kind="map", x="b_over_a")
+    chosen = complete_plot_selection(results.isel(b_over_a=[2, 0, 3, 1]), kind="map", x="b_over_a")
     found = extract_map_of_panel(results.isel(b_over_a=[2, 0, 3, 1]), chosen)
     assert found.x.tolist() == [1.5, 2.0, 3.0, 4.0]
     assert found.find_cell_number_at(1.6, 1.19) == 5  # the second point of the dataset is b/a = 1.5
@@ -88,7 +88,7 @@ def test_a_recorded_motion_is_shown():
     )
     view = ResultsView(steps)
     view.set_widget_state({"variable": "friction_coefficient", "x": "load_point_displacement"})
-    assert view.write_python_code().startswith("import rsfstudy")
+    assert view.format_equivalent_python_code().startswith("import rsfstudy")
     (_first, second) = extract_curves_of_panel(steps, view.selection)
     np.testing.assert_array_equal(second.x, steps["load_point_displacement"].values[1])
     assert len(view.draw_figure_for_download().axes) == 1
@@ -98,7 +98,7 @@ def test_a_single_failed_cell_among_a_million_is_found():
     status = np.zeros((1000, 1000), dtype=np.int8)
     status[:500] = int(Status.STABLE_FOR_ALL_STEPS)
     status[123, 456] = int(Status.CELL_RAISED)
-    marks = find_cells_to_mark(status, np.arange(10**6).reshape(1000, 1000))
+    marks = find_cells_to_mark_with_status(status, np.arange(10**6).reshape(1000, 1000))
     failed = marks.status_codes == int(Status.CELL_RAISED)
     assert marks.cell_numbers[failed].tolist() == [123_456]
     assert (marks.row_indices[failed].item(), marks.column_indices[failed].item()) == (123, 456)

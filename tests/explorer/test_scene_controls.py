@@ -9,7 +9,7 @@ import panel as pn
 import pytest
 
 import rsfstudy
-from rsfstudy.explorer.background_jobs import BackgroundJobs
+from rsfstudy.explorer.background_jobs import BackgroundJobRunner
 from rsfstudy.explorer.number_widgets import SliderRange
 from rsfstudy.explorer.scene_controls import SceneControls
 from rsfstudy.explorer.scene_presets import SETTINGS_BY_PRESET_LABEL
@@ -93,7 +93,7 @@ def test_user_defined_parts_have_widgets():
     sliders = {row.objects[0].label: row for row in rows if isinstance(row, pn.Row)}
     sliders["healing_power"].objects[1].value = 4.0
     assert scene_of(controls) == scene.with_(healing_power=4.0)
-    assert "law=ExplorerLaw" in settings.write_python_code()
+    assert "law=ExplorerLaw" in settings.format_equivalent_python_code()
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def wait_until(condition):
 
 def test_the_last_of_several_jobs_delivers():
     """A job that waits is replaced, and the result of an outdated job is discarded."""
-    jobs, results, may_end = BackgroundJobs(lambda messages: None), [], threading.Event()
+    jobs, results, may_end = BackgroundJobRunner(lambda messages: None), [], threading.Event()
 
     def compute(number):
         may_end.wait(30)
@@ -161,14 +161,14 @@ def test_the_last_of_several_jobs_delivers():
 
 
 def test_a_cancelled_job_ends_and_delivers_nothing():
-    jobs, results, started = BackgroundJobs(lambda messages: None), [], threading.Event()
+    jobs, results, started = BackgroundJobRunner(lambda messages: None), [], threading.Event()
 
     def compute(report):
         started.set()
         while True:
             report(0.5, "half")
 
-    jobs.start(compute, results.append, results.append, label="long")
+    jobs.start(compute, results.append, results.append, progress_label="long")
     started.wait(30)
     jobs.cancel_all()
     wait_until(lambda: not jobs.is_running)
@@ -176,7 +176,7 @@ def test_a_cancelled_job_ends_and_delivers_nothing():
 
 
 def test_errors_of_a_job_reach_the_page():
-    jobs, failures, error = BackgroundJobs(lambda messages: None), [], ValueError("wrong")
+    jobs, failures, error = BackgroundJobRunner(lambda messages: None), [], ValueError("wrong")
 
     def compute(_report):
         raise error

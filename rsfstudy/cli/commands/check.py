@@ -10,7 +10,7 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
@@ -70,10 +70,10 @@ class CheckCommandResult(CommandResult):
 
     def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        from rsfstudy.cli.study_results import verdicts_to_json
+        from rsfstudy.cli.study_results import convert_verdicts_to_json
 
         only = self.study_results[0].study_name if len(self.study_results) == 1 else ""
-        claims = [] if self.verdicts is None else verdicts_to_json(self.verdicts, only)
+        claims = [] if self.verdicts is None else convert_verdicts_to_json(self.verdicts, only)
         return {
             "studies": [one.to_json_fields() for one in self.study_results],
             "claims": claims,
@@ -83,7 +83,7 @@ class CheckCommandResult(CommandResult):
         }
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @options.study_name_or_all_argument
 @options.output_directory_option
 @click.option(
@@ -94,13 +94,15 @@ class CheckCommandResult(CommandResult):
     help="Check only this claim. The claim must apply to the results. Example: C6.",
 )
 @options.json_option
-def check(given: options.CommandOptions) -> int:
+def check(command_options: options.CommandOptions) -> int:
     """Compare results with published values.
 
     NAME is the name of a study, or a results file. The exit status is 1 if a verdict differs from
     the expected verdict, if a cell failed, or if no claim applies to the results.
     """
-    return print_result_as_text_or_json(_check_studies(given), _print_check_result, given.as_json)
+    return print_result_as_text_or_json(
+        _check_studies(command_options), _print_check_result, command_options.as_json
+    )
 
 
 def _check_studies(command_options: options.CommandOptions) -> CheckCommandResult:

@@ -11,7 +11,7 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
@@ -47,7 +47,7 @@ class CompareCommandResult(CommandResult):
     """
 
     results_files: Sequence[Path]
-    provenance: Sequence[Mapping[str, Any]]
+    provenance_of_files: Sequence[Mapping[str, Any]]
     differences: ResultsComparison
 
     @property
@@ -61,12 +61,12 @@ class CompareCommandResult(CommandResult):
         found = self.differences
         if not found.finished_cell_counts[0]:
             return "nothing to compare, because the files have no finished cell in common"
-        wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
-        if len(found.statuses):
+        wrong = [f"{name} differs beyond error estimates" for name in found.variables_beyond_errors]
+        if len(found.differing_statuses):
             from rsfstudy.formatting import format_count_with_noun
 
             wrong.append(
-                f"{format_count_with_noun(len(found.statuses), 'cell')} with different statuses"
+                f"{format_count_with_noun(len(found.differing_statuses), 'cell')} with different statuses"
             )
         return "; ".join(wrong) or "nothing differs beyond error estimates"
 
@@ -74,18 +74,18 @@ class CompareCommandResult(CommandResult):
         """Return the fields of the JSON output."""
         found = self.differences
         both, first, second = found.finished_cell_counts
-        places = found.statuses.drop(columns=["first", "second"]).to_dict("records")
-        statuses = found.statuses[["first", "second"]].to_dict("records")
+        places = found.differing_statuses.drop(columns=["first", "second"]).to_dict("records")
+        statuses = found.differing_statuses[["first", "second"]].to_dict("records")
         return {
             "files": [
                 {"file": file, "time": about["time"], "command_line": about["command"]}
-                for file, about in zip(self.results_files, self.provenance, strict=True)
+                for file, about in zip(self.results_files, self.provenance_of_files, strict=True)
             ],
             "agrees": found.agrees,
             "verdict": self.summary_sentence,
             "cells": {"both": both, "first_only": first, "second_only": second},
-            "declaration": _differences_to_json(found.declaration),
-            "provenance": _differences_to_json(found.origin),
+            "declaration": _convert_differences_to_json(found.differing_declaration_entries),
+            "provenance": _convert_differences_to_json(found.differing_provenance),
             "axes": [
                 {"dimension": name, "first_only": first, "second_only": second}
                 for name, (first, second) in found.differing_axis_points.items()
@@ -99,17 +99,19 @@ class CompareCommandResult(CommandResult):
         }
 
 
-def _differences_to_json(differences: Mapping[str, tuple[Any, Any]]) -> list[dict[str, Any]]:
+def _convert_differences_to_json(
+    differences: Mapping[str, tuple[Any, Any]],
+) -> list[dict[str, Any]]:
     """Convert differences to a list of entries for the JSON output."""
     return [{"name": n, "first": a, "second": b} for n, (a, b) in differences.items()]
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument("first")
 @click.argument("second")
 @options.output_directory_option
 @options.json_option
-def compare(given: options.CommandOptions) -> int:
+def compare(command_options: options.CommandOptions) -> int:
     """Compare the declarations, versions and numbers of two results files.
 
     To compare the results of two named studies, pass the names of the studies. The command compares
@@ -120,24 +122,31 @@ def compare(given: options.CommandOptions) -> int:
     from rsfstudy.api import find_results_file
     from rsfstudy.storage import StoredDataset
 
-    files = [find_results_file(name, given.output) for name in (given.first, given.second)]
+    files = [
+        find_results_file(name, command_options.output)
+        for name in (command_options.first, command_options.second)
+    ]
     datasets = [rsfstudy.open(file) for file in files]
     result = CompareCommandResult(
         files, [StoredDataset(one).provenance for one in datasets], rsfstudy.compare(*datasets)
     )
-    return print_result_as_text_or_json(result, _print_file_comparison, given.as_json)
+    return print_result_as_text_or_json(result, _print_file_comparison, command_options.as_json)
 
 
 def _print_file_comparison(result: CompareCommandResult) -> None:
     """Print the files, the differences and the verdict."""
     from rsfstudy.cli.dataset_agreement_tables import build_dataset_agreement_table
-    from rsfstudy.formatting import format_count_with_noun, format_list
+    from rsfstudy.formatting import format_abbreviated_list, format_count_with_noun
 
     found = result.differences
-    for letter, file, about in zip("AB", result.results_files, result.provenance, strict=True):
+    for letter, file, about in zip(
+        "AB", result.results_files, result.provenance_of_files, strict=True
+    ):
         print_line(f"{letter}: {file}, {about['time']}, {about['command']}")
-    print_tables_and_sentences([_build_differences_table("declaration", found.declaration)])
-    print_tables_and_sentences([_build_differences_table("provenance", found.origin)])
+    print_tables_and_sentences(
+        [_build_differences_table("declaration", found.differing_declaration_entries)]
+    )
+    print_tables_and_sentences([_build_differences_table("provenance", found.differing_provenance)])
     both, first, second = found.finished_cell_counts
     print_line(
         f"{format_count_with_noun(both, 'cell')} in both, {first:,} only in A, {second:,} only in B"
@@ -145,10 +154,12 @@ def _print_file_comparison(result: CompareCommandResult) -> None:
     for axis, alone in found.differing_axis_points.items():
         for letter, points in zip("AB", alone, strict=True):
             if points:
-                print_line(f"{axis} only in {letter} ({len(points)}): {format_list(points)}")
-    print_tables_and_sentences([_build_differing_statuses_table(found.statuses)])
-    if len(found.statuses) > _MAX_DIFFERING_CELLS:
-        print_line(f"and {len(found.statuses) - _MAX_DIFFERING_CELLS} more cells")
+                print_line(
+                    f"{axis} only in {letter} ({len(points)}): {format_abbreviated_list(points)}"
+                )
+    print_tables_and_sentences([_build_differing_statuses_table(found.differing_statuses)])
+    if len(found.differing_statuses) > _MAX_DIFFERING_CELLS:
+        print_line(f"and {len(found.differing_statuses) - _MAX_DIFFERING_CELLS} more cells")
     print_tables_and_sentences(
         [build_dataset_agreement_table(_select_rows_with_differences(found.agreement_table))]
     )
@@ -161,12 +172,12 @@ def _build_differences_table(
     section_name: str, differences: Mapping[str, tuple[Any, Any]]
 ) -> TextTable:
     """Return a table of the entries that differ between the files."""
-    from rsfstudy.formatting import format_value
+    from rsfstudy.formatting import format_number_or_text
     from rsfstudy.reporting import TextTable
 
     headings = f"difference in {section_name}", "A", "B"
     rows = [
-        (name, *(shorten_text(format_value(v), _MAX_VALUE_CHARACTERS) for v in pair))
+        (name, *(shorten_text(format_number_or_text(v), _MAX_VALUE_CHARACTERS) for v in pair))
         for name, pair in differences.items()
     ]
     return TextTable([dict(zip(headings, row, strict=True)) for row in rows], "", headings)
@@ -174,14 +185,14 @@ def _build_differences_table(
 
 def _build_differing_statuses_table(differing_statuses: pd.DataFrame) -> TextTable:
     """Return a table of the first cells that have different statuses."""
-    from rsfstudy.formatting import format_nonempty_fields
+    from rsfstudy.formatting import format_fields_except_none
     from rsfstudy.reporting import TextTable
 
     few = differing_statuses[:_MAX_DIFFERING_CELLS]
     places: list[dict[Any, Any]] = few.drop(columns=["first", "second"]).to_dict("records")
     rows = [
         {
-            "cell": format_nonempty_fields({str(name): value for name, value in place.items()}),
+            "cell": format_fields_except_none({str(name): value for name, value in place.items()}),
             "A": a,
             "B": b,
         }

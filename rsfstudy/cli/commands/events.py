@@ -11,12 +11,12 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_OK, CommandResult, print_result_as_text_or_json
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.record_options import (
     collect_record_reading_options,
-    make_quantity_option,
+    make_number_with_units_option,
     record_reading_options,
 )
 
@@ -46,20 +46,18 @@ class EventsCommandResult(CommandResult):
 
     def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        from rsfstudy.reporting import summarise_record_events_as_fields
+        from rsfstudy.reporting import summarise_events_as_json_fields
 
         pairs = zip(self.record_files, self.event_catalogues, strict=True)
         return {
-            "records": [
-                {"file": file, **summarise_record_events_as_fields(of)} for file, of in pairs
-            ]
+            "records": [{"file": file, **summarise_events_as_json_fields(of)} for file, of in pairs]
         }
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument("records", nargs=-1, required=True, type=options.PathParameterType())
 @record_reading_options
-@make_quantity_option(
+@make_number_with_units_option(
     "--stiffness",
     "Stiffness between the fault and the displacement sensor. If the record contains fault "
     "slip, pass 'inf'. Example: '0.05 MPa/um'.",
@@ -72,21 +70,23 @@ class EventsCommandResult(CommandResult):
     "samples are negative, otherwise 1]",
 )
 @options.json_option
-def events(given: options.CommandOptions) -> int:
+def events(command_options: options.CommandOptions) -> int:
     """Detect drops of shear stress in RECORDS.
 
     A record must contain shear stress or friction, and time or displacement. The command prints the
     smallest detectable drop, and a table with the times, durations, intervals and sizes of the
     drops. With --json, the command prints all quantities with their errors.
     """
-    reading = collect_record_reading_options(given)
-    sign = None if given.sign is None else int(given.sign)
+    reading = collect_record_reading_options(command_options)
+    sign = None if command_options.sign is None else int(command_options.sign)
     catalogues = [
-        rsfstudy.events(path, stiffness=given.stiffness, sign=sign, **reading)
-        for path in given.records
+        rsfstudy.events(path, stiffness=command_options.stiffness, sign=sign, **reading)
+        for path in command_options.records
     ]
     return print_result_as_text_or_json(
-        EventsCommandResult(given.records, catalogues), _print_events, given.as_json
+        EventsCommandResult(command_options.records, catalogues),
+        _print_events,
+        command_options.as_json,
     )
 
 

@@ -7,13 +7,13 @@ import sys
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line
 from rsfstudy.errors import SignalInterrupt
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument("file", required=False, type=options.PathParameterType(exists=True))
 @click.option(
     "--state",
@@ -29,7 +29,7 @@ from rsfstudy.errors import SignalInterrupt
 @click.option(
     "--no-browser", is_flag=True, help="Print the address of the page without opening a browser."
 )
-def explore(given: options.CommandOptions) -> int:
+def explore(command_options: options.CommandOptions) -> int:
     """Show a scene, results or a record in the browser.
 
     If FILE is omitted, the page shows a spring-slider model with sliders for its parameters. If
@@ -42,11 +42,11 @@ def explore(given: options.CommandOptions) -> int:
 
     try:
         serve(
-            given.file,
-            given.state,
-            port=given.port,
-            open_browser=not given.no_browser,
-            announce_address=_print_page_address,
+            command_options.file,
+            command_options.state,
+            port=command_options.port,
+            open_browser=not command_options.no_browser,
+            announce_address=_print_explorer_address,
         )
     except SignalInterrupt:
         raise
@@ -55,7 +55,7 @@ def explore(given: options.CommandOptions) -> int:
     return EXIT_STATUS_OK
 
 
-def _print_page_address(url: str) -> None:
+def _print_explorer_address(url: str) -> None:
     """Print the first address of the page."""
     print_line(f"{url}\nThe page is open until you press Ctrl-C.", soft_wrap=True)
     sys.stdout.flush()

@@ -7,15 +7,15 @@ import os
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line
 from rsfstudy.errors import DataError, InvalidValue
 
-_QUANTITIES_OF_UNITS_OPTION = ("stress", "length", "time")
+_QUANTITY_ORDER_IN_UNITS_OPTION = ("stress", "length", "time")
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument("file", type=options.PathParameterType())
 @click.option("--csv", is_flag=True, help="Write a CSV table. Constant columns are omitted.")
 @click.option("--mat", is_flag=True, help="Write all variables to a MATLAB file.")
@@ -32,7 +32,7 @@ _QUANTITIES_OF_UNITS_OPTION = ("stress", "length", "time")
     help="Output path. The suffix is replaced by .csv or .mat.  [default: path of FILE with "
     "the new suffix]",
 )
-def export(given: options.CommandOptions) -> int:
+def export(command_options: options.CommandOptions) -> int:
     """Export results or a motion to other programs.
 
     The command writes a CSV table, a MATLAB file, or both. The CSV table of a study has one row per
@@ -43,18 +43,21 @@ def export(given: options.CommandOptions) -> int:
     from rsfstudy.storage import read_dataset
 
     writers = {"csv": to_csv, "mat": to_mat}
-    asked = [ending for ending in writers if getattr(given, ending)]
+    asked = [ending for ending in writers if getattr(command_options, ending)]
     if not asked:
         raise click.UsageError("Pass --csv, --mat, or both.")
-    dataset = read_dataset(given.file)
-    paths = {ending: (given.output or given.file).with_suffix(f".{ending}") for ending in asked}
+    dataset = read_dataset(command_options.file)
+    paths = {
+        ending: (command_options.output or command_options.file).with_suffix(f".{ending}")
+        for ending in asked
+    }
     for path in paths.values():
         if os.path.lexists(path):
             remedy = "Choose another path."
             raise InvalidValue("--output", str(path), "already exists", remedy=remedy)
-    if given.units:
+    if command_options.units:
         dataset = dataset.rsf.in_units(
-            **dict(zip(_QUANTITIES_OF_UNITS_OPTION, given.units, strict=True))
+            **dict(zip(_QUANTITY_ORDER_IN_UNITS_OPTION, command_options.units, strict=True))
         )
     for ending, path in paths.items():
         try:

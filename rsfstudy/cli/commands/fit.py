@@ -11,7 +11,7 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
@@ -22,7 +22,7 @@ from rsfstudy.cli.options import DecoratedFunction
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.cli.record_options import (
     collect_record_reading_options,
-    make_quantity_option,
+    make_number_with_units_option,
     record_reading_options,
 )
 from rsfstudy.defaults import Defaults
@@ -70,7 +70,7 @@ class FitCommandResult(CommandResult):
 
     def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
-        from rsfstudy.reporting import summarise_fits_as_fields
+        from rsfstudy.reporting import summarise_fits_as_json_fields
 
         return {
             "records": [
@@ -79,17 +79,18 @@ class FitCommandResult(CommandResult):
                     "rows": len(record),
                     "processing": record.processing,
                     "steps": [
-                        _loading_step_to_json(*step) for step in enumerate(record.loading_steps, 1)
+                        _convert_loading_step_to_json(*step)
+                        for step in enumerate(record.loading_steps, 1)
                     ],
                 }
                 for record in self.records
             ],
-            "fits": summarise_fits_as_fields(self.fit_dataset),
+            "fits": summarise_fits_as_json_fields(self.fit_dataset),
             "files": self.output_files,
         }
 
 
-def _loading_step_to_json(step_number: int, loading_step: LoadingStep) -> dict[str, Any]:
+def _convert_loading_step_to_json(step_number: int, loading_step: LoadingStep) -> dict[str, Any]:
     """Return the JSON entry of a step. The units are s, um/s and Pa."""
     names = "start", "end", "velocity_before", "velocity_after", "stress_before", "stress_after"
     return {"step": step_number, **{name: getattr(loading_step, name) for name in names}}
@@ -102,7 +103,7 @@ def _split_comma_separated_list(
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
 
 
-def _make_comma_list_option(
+def _make_comma_separated_list_option(
     *option_names: str, help_text: str, default: str | None = None, metavar: str = "TEXT"
 ) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option for a comma-separated list."""
@@ -115,25 +116,25 @@ def _make_comma_list_option(
     )
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument("records", nargs=-1, required=True, type=options.PathParameterType())
 @record_reading_options
-@make_quantity_option(
+@make_number_with_units_option(
     "--stiffness",
     "Stiffness of the machine, optionally divided by the normal stress. To estimate "
     "the stiffness from the record, pass 'from record'. Examples: '0.03 MPa/um' or '1.6e-3 /um'.",
 )
-@make_quantity_option(
+@make_number_with_units_option(
     "--slip-distance", "Initial guess of the slip distance D_c. Example: '10 um'."
 )
-@_make_comma_list_option(
+@_make_comma_separated_list_option(
     "--law",
     "laws",
     metavar="LAW,...",
     default="slip,slowness",
     help_text="State evolution laws, separated by commas. A separate fit is computed for each law.",
 )
-@_make_comma_list_option(
+@_make_comma_separated_list_option(
     "--free",
     metavar="NAME,...",
     help_text="Parameters to fit, separated by commas. In addition to the default parameters, "
@@ -142,7 +143,7 @@ def _make_comma_list_option(
     "slip_distance, mu_star and trend1; for laws with two state variables: a, b1, b2, "
     "slip_distance, slip_distance_2, mu_star and trend1]",
 )
-@_make_comma_list_option(
+@_make_comma_separated_list_option(
     "--step",
     "steps",
     metavar="N,...",
@@ -153,19 +154,19 @@ def _make_comma_list_option(
     is_flag=True,
     help="Fit all steps in all RECORDS jointly, with common values of a, b and D_c.",
 )
-@make_quantity_option(
+@make_number_with_units_option(
     "--before",
     "Length of the fit window before each step, as a load point displacement. Example: '100 "
     "um'.  [default: half the displacement since the previous step]",
     "0 um",
 )
-@make_quantity_option(
+@make_number_with_units_option(
     "--after",
     "Length of the fit window after each step, as a load point displacement. Example: '250 "
     "um'.  [default: displacement until the next step]",
     "0 um",
 )
-@options.make_count_option(
+@options.make_positive_integer_option(
     "--windows",
     1,
     "Number of fit windows of different lengths. The windows contain from half to all of the "
@@ -186,7 +187,7 @@ def _make_comma_list_option(
     help="Load point history in the model: ideal velocity steps (steps) or the recorded "
     "displacement (recorded).",
 )
-@make_quantity_option(
+@make_number_with_units_option(
     "--averaging",
     "Averaging time of the data logger. If each averaging window ends at the recorded time, "
     "write 'trailing' before the averaging time. Examples: '1 s' or 'trailing 1 s'.  [default: "
@@ -210,7 +211,7 @@ def _make_comma_list_option(
     help="Number of samples to draw from the posterior distribution with emcee.  [default: 0]",
 )
 @options.make_set_scene_fields_option("Set a scene field that is not fitted. Example: a=0.01.")
-@options.make_count_option(
+@options.make_positive_integer_option(
     "--budget",
     Defaults.FIT_EVALUATION_BUDGET,
     "Maximum number of right-hand-side evaluations per fit.",
@@ -220,7 +221,7 @@ def _make_comma_list_option(
     type=click.Choice(Engine.NAMES),
     help="Integration engine.  [default: compiled if Numba is installed, otherwise scipy]",
 )
-@options.make_image_option(
+@options.make_image_path_option(
     "--output",
     Path("fit.png"),
     "Figure path. The data are written to a NetCDF file in the same directory.",
@@ -229,7 +230,7 @@ def _make_comma_list_option(
 @options.figure_header_option
 @options.quiet_option
 @options.json_option
-def fit(given: options.CommandOptions) -> int:
+def fit(command_options: options.CommandOptions) -> int:
     """Fit friction parameters to velocity steps in RECORDS.
 
     The command prints the detected steps and a table of a, b, D_c and their standard errors. The
@@ -244,18 +245,18 @@ def fit(given: options.CommandOptions) -> int:
     from rsfstudy.cli.overwrite_checks import check_output_may_be_replaced
     from rsfstudy.reporting import contains_fits
 
-    data = given.output.with_suffix(".nc")
+    data = command_options.output.with_suffix(".nc")
     check_output_may_be_replaced(data, contains_fits, "fit")
-    about = collect_record_reading_options(given)
-    if given.stiffness != STIFFNESS_OPTION_FROM_RECORD:
-        about["stiffness"] = given.stiffness
-    records = [rsfstudy.read_record(path, **about) for path in given.records]
-    if not given.as_json:
+    about = collect_record_reading_options(command_options)
+    if command_options.stiffness != STIFFNESS_OPTION_FROM_RECORD:
+        about["stiffness"] = command_options.stiffness
+    records = [rsfstudy.read_record(path, **about) for path in command_options.records]
+    if not command_options.as_json:
         for record in records:
             _print_loading_steps(record)
-    dataset = _fit_and_write_files(records, data, given)
-    result = FitCommandResult(records, dataset, [given.output, data])
-    return print_result_as_text_or_json(result, _print_fits, given.as_json)
+    dataset = _fit_and_write_files(records, data, command_options)
+    result = FitCommandResult(records, dataset, [command_options.output, data])
+    return print_result_as_text_or_json(result, _print_fits, command_options.as_json)
 
 
 def _fit_and_write_files(
@@ -318,7 +319,7 @@ def _print_loading_steps(record: Record) -> None:
         print_line(f"and {left} more steps")
 
 
-def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[str, str]:
+def _format_normal_stresses_of_step(step: LoadingStep, include_stresses: bool) -> dict[str, str]:
     """Format the normal stresses of a step in MPa, if the table shows them."""
     stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
-    return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if is_shown}
+    return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if include_stresses}

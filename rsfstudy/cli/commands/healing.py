@@ -12,7 +12,7 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
@@ -71,7 +71,7 @@ class HealingCommandResult(CommandResult):
         }
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument("record", type=options.PathParameterType())
 @record_reading_options
 @click.option(
@@ -79,14 +79,14 @@ class HealingCommandResult(CommandResult):
     help="Stiffness of the machine. This option is required if the record contains fault slip "
     "instead of load point displacement. Example: '0.03 MPa/um'.",
 )
-@options.make_image_option(
+@options.make_image_path_option(
     "--output",
     Path("healing.png"),
     "Figure path. The data are written to a NetCDF file in the same directory.",
 )
 @options.figure_style_options
 @options.json_option
-def healing(given: options.CommandOptions) -> int:
+def healing(command_options: options.CommandOptions) -> int:
     """Measure frictional healing in the holds of RECORD.
 
     The command prints one row per hold with its duration, the friction before the hold, the peak
@@ -103,16 +103,25 @@ def healing(given: options.CommandOptions) -> int:
     from rsfstudy.reporting import is_hold_table
     from rsfstudy.storage import write_dataset
 
-    data = given.output.with_suffix(".nc")
+    data = command_options.output.with_suffix(".nc")
     check_output_may_be_replaced(data, is_hold_table, "table of holds")
-    about = {"stiffness": given.stiffness, **collect_record_reading_options(given)}
-    record = rsfstudy.read_record(given.record, **about)
-    table = rsfstudy.healing(record).assign_attrs(build_provenance_attributes(given.command_line))
+    about = {
+        "stiffness": command_options.stiffness,
+        **collect_record_reading_options(command_options),
+    }
+    record = rsfstudy.read_record(command_options.record, **about)
+    table = rsfstudy.healing(record).assign_attrs(
+        build_provenance_attributes(command_options.command_line)
+    )
     write_dataset(table, data)
-    appearance = given.collect_option_values("style", "width")
-    write_figure(rsfstudy.plot_healing(table, record, **appearance), given.output, given.style)
-    result = HealingCommandResult(record, table, record.stiffness(), [given.output, data])
-    return print_result_as_text_or_json(result, _print_healing, given.as_json)
+    appearance = command_options.collect_option_values("style", "width")
+    write_figure(
+        rsfstudy.plot_healing(table, record, **appearance),
+        command_options.output,
+        command_options.style,
+    )
+    result = HealingCommandResult(record, table, record.stiffness(), [command_options.output, data])
+    return print_result_as_text_or_json(result, _print_healing, command_options.as_json)
 
 
 def _print_healing(result: HealingCommandResult) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_OK, CommandResult, print_result_as_text_or_json
 from rsfstudy.study import read_study_titles
 
@@ -28,12 +28,12 @@ class ListStudiesCommandResult(CommandResult):
         }
 
 
-@click.command("list", cls=OptionsObjectCommand)
+@click.command("list", cls=CommandWithOptionsObject)
 @options.json_option
-def list_studies(given: options.CommandOptions) -> int:
+def list_studies(command_options: options.CommandOptions) -> int:
     """List all studies with their titles."""
     return print_result_as_text_or_json(
-        ListStudiesCommandResult(read_study_titles()), _print_study_titles, given.as_json
+        ListStudiesCommandResult(read_study_titles()), _print_study_titles, command_options.as_json
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line
 from rsfstudy.defaults import Defaults
@@ -15,7 +15,7 @@ from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @options.study_name_or_all_argument
 @options.make_output_option(
     "Directory that contains the results and receives the figure, or path of a single figure. "
@@ -30,7 +30,7 @@ from rsfstudy.errors import InvalidValue
 )
 @options.study_file_option
 @options.abscissa_option
-def plot(given: options.CommandOptions) -> int:
+def plot(command_options: options.CommandOptions) -> int:
     """Draw the figure of a study or of a motion.
 
     NAME is the name of a study, or a file that contains results or a motion. By default, the
@@ -41,11 +41,17 @@ def plot(given: options.CommandOptions) -> int:
     from rsfstudy.cli.figure_files import build_default_figure_path
     from rsfstudy.cli.study_options import list_selected_study_names
 
-    status, target = EXIT_STATUS_OK, _find_figure_path_in_output_option(given)
-    for name in list_selected_study_names(given):
-        results = find_results_file(name, Defaults.OUTPUT_DIRECTORY if target else given.output)
-        beside = results if given.output is None else given.output / results.name
-        drawn = _draw_figure(results, target or build_default_figure_path(beside, given), given)
+    status, target = EXIT_STATUS_OK, _find_figure_path_in_output_option(command_options)
+    for name in list_selected_study_names(command_options):
+        results = find_results_file(
+            name, Defaults.OUTPUT_DIRECTORY if target else command_options.output
+        )
+        beside = (
+            results if command_options.output is None else command_options.output / results.name
+        )
+        drawn = _draw_figure(
+            results, target or build_default_figure_path(beside, command_options), command_options
+        )
         status = status if drawn else EXIT_STATUS_FAILED
         for file in drawn:
             print_line(f"{file}")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line
 from rsfstudy.defaults import Defaults
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument("directory", default=Defaults.OUTPUT_DIRECTORY, type=options.PathParameterType())
 @click.option(
     "--output",
@@ -19,7 +19,7 @@ from rsfstudy.defaults import Defaults
     metavar="FILE",
     help="Path of the HTML page.  [default: DIRECTORY/report.html]",
 )
-def report(given: options.CommandOptions) -> int:
+def report(command_options: options.CommandOptions) -> int:
     """Write an HTML page that shows all results in a directory.
 
     For each file, the page contains the verdicts, the figure, the slopes, the failed cells and the
@@ -28,7 +28,7 @@ def report(given: options.CommandOptions) -> int:
     """
     from rsfstudy.api import write_html_report
 
-    page, unread = write_html_report(given.directory, given.output)
+    page, unread = write_html_report(command_options.directory, command_options.output)
     print_line(f"wrote {page}", soft_wrap=True)
     for file in unread:
         text = f"{file} cannot be read (see the page for the reason)"

@@ -11,7 +11,7 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.errors import RsfStudyError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rsfstudy.measures import Outcome
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument("file", type=options.PathParameterType())
 @click.option(
     "--cell",
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     "Directory for the recomputed results.  [default: no file is written]", file_okay=False
 )
 @options.worker_pool_options
-def rerun(given: options.CommandOptions) -> int:
+def rerun(command_options: options.CommandOptions) -> int:
     """Recompute the results in a file, and compare both results.
 
     The command rebuilds the study from the results file. The exit status is 1 if a recomputed
@@ -47,15 +47,15 @@ def rerun(given: options.CommandOptions) -> int:
     """
     from rsfstudy.cli.study_options import open_worker_pool
 
-    if given.place:
-        return _recompute_and_print_cell(given)
-    with open_worker_pool(given) as where:
-        asked = given.collect_option_values("study", "output", "time_limit")
+    if command_options.place:
+        return _recompute_and_print_cell(command_options)
+    with open_worker_pool(command_options) as where:
+        asked = command_options.collect_option_values("study", "output", "time_limit")
         agreement = rsfstudy.rerun(
-            given.file,
+            command_options.file,
             workers=where.process_count,
             client=where.client,
-            progress=not given.quiet,
+            progress=not command_options.quiet,
             **asked,
         )
     _print_agreement_with_file(agreement)
@@ -124,10 +124,10 @@ def print_recomputed_cell(scene: Scene, outcome: Outcome, stored_values: xr.Data
     stored_values : xarray.Dataset
         Values of the cell in the results file.
     """
-    from rsfstudy.formatting import format_nonempty_fields
+    from rsfstudy.formatting import format_fields_except_none
     from rsfstudy.reporting import TextTable
 
-    print_line(f"{format_nonempty_fields(scene.as_dict())}\n")
+    print_line(f"{format_fields_except_none(scene.as_dict())}\n")
     print_tables_and_sentences(
         [TextTable(_build_cell_comparison_rows(outcome.values, stored_values))]
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
@@ -73,9 +73,13 @@ class StudyRunOutcome:
 
     def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output that describe the run of one study."""
-        from rsfstudy.cli.study_results import verdicts_to_json
+        from rsfstudy.cli.study_results import convert_verdicts_to_json
 
-        claims = [] if self.verdicts is None else verdicts_to_json(self.verdicts, self.study_name)
+        claims = (
+            []
+            if self.verdicts is None
+            else convert_verdicts_to_json(self.verdicts, self.study_name)
+        )
         return {
             "study": self.study_name,
             "outcome": self.outcome_label,
@@ -107,7 +111,7 @@ class RunCommandResult(CommandResult):
         return {"studies": [one.to_json_fields() for one in self.study_run_outcomes]}
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @options.study_name_or_all_argument
 @options.set_axis_values_option
 @options.output_directory_option
@@ -134,7 +138,7 @@ class RunCommandResult(CommandResult):
 @options.figure_options
 @options.rig_options
 @options.json_option
-def run(given: options.CommandOptions) -> int:
+def run(command_options: options.CommandOptions) -> int:
     """Run a study and write its results and its figure.
 
     NAME is the name of a study, or a Python file that declares a study. The command writes the
@@ -149,31 +153,45 @@ def run(given: options.CommandOptions) -> int:
     )
     from rsfstudy.execution import OutputOptions
 
-    studies = [build_study_from_options(name, given) for name in list_selected_study_names(given)]
+    studies = [
+        build_study_from_options(name, command_options)
+        for name in list_selected_study_names(command_options)
+    ]
     skipped = (
-        _find_studies_with_missing_engine(studies) if given.every and given.engine is None else []
+        _find_studies_with_missing_engine(studies)
+        if command_options.every and command_options.engine is None
+        else []
     )
-    if not given.as_json:
+    if not command_options.as_json:
         for one in skipped:
             print_line(
                 f"{one.study_name}: skipped: {one.reason_for_missing_results}", style="yellow"
             )
     studies = [study for study in studies if study.name not in {one.study_name for one in skipped}]
-    kept = given.collect_option_values(
+    kept = command_options.collect_option_values(
         "output", "format", "fresh", "keep_going", "despite_failures", "command_line"
     )
-    with open_worker_pool(given, given.output / "workers.log" if given.every else None) as where:
+    with open_worker_pool(
+        command_options, command_options.output / "workers.log" if command_options.every else None
+    ) as where:
         ready = [
-            (s, make_run_function_with_progress(s, OutputOptions(**kept), where, not given.quiet))
+            (
+                s,
+                make_run_function_with_progress(
+                    s, OutputOptions(**kept), where, not command_options.quiet
+                ),
+            )
             for s in studies
         ]
         for study in studies:
-            _print_expected_cost(study, given)
-        if not given.every:
+            _print_expected_cost(study, command_options)
+        if not command_options.every:
             return print_result_as_text_or_json(
-                RunCommandResult([_run_study(*ready[0], given)]), _print_nothing, given.as_json
+                RunCommandResult([_run_study(*ready[0], command_options)]),
+                _print_nothing,
+                command_options.as_json,
             )
-        return _run_studies_in_turn(ready, given, skipped)
+        return _run_studies_in_turn(ready, command_options, skipped)
 
 
 def _find_studies_with_missing_engine(studies: Sequence[Study]) -> list[StudyRunOutcome]:

@@ -9,7 +9,7 @@ import click
 
 import rsfstudy
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.errors import InvalidValue
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @options.make_set_scene_fields_option(
     "Set a scene field. Values can have units if a rig is defined. The value of the field "
     "'loading' can be the path of a CSV file. Examples: law=slowness, hold_time='100 s' or "
@@ -52,13 +52,13 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 @click.option(
     "--rtol", type=float, metavar="RTOL", default=Accuracy.DEFAULT_RTOL, help="Relative tolerance."
 )
-@options.make_count_option(
+@options.make_positive_integer_option(
     "--budget", Accuracy.DEFAULT_BUDGET, "Maximum number of right-hand-side evaluations."
 )
 @click.option(
     "--engine", type=click.Choice(Engine.NAMES), default=Engine.SCIPY, help="Integration engine."
 )
-@options.make_image_option(
+@options.make_image_path_option(
     "--output",
     Path("motion.png"),
     "Figure path. The data are written to a NetCDF file in the same directory.",
@@ -66,7 +66,7 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 @options.figure_style_options
 @options.figure_header_option
 @click.option("--quiet", is_flag=True, help="Print only the status. Peaks and events are omitted.")
-def simulate(given: options.CommandOptions) -> int:
+def simulate(command_options: options.CommandOptions) -> int:
     """Compute a single motion, and write its figure and its data.
 
     The figure shows friction and slip rate along the motion, and the path in the phase plane.
@@ -79,25 +79,27 @@ def simulate(given: options.CommandOptions) -> int:
     from rsfstudy.execution import build_provenance_attributes
     from rsfstudy.reporting import is_motion
 
-    check_output_may_be_replaced(given.output.with_suffix(".nc"), is_motion, "motion")
-    scene, rig = _build_scene_and_rig(given)
+    check_output_may_be_replaced(command_options.output.with_suffix(".nc"), is_motion, "motion")
+    scene, rig = _build_scene_and_rig(command_options)
     duration, accuracy = (
-        _parse_dimensionless_duration(given.duration, rig),
+        _parse_dimensionless_duration(command_options.duration, rig),
         ("rtol", "budget", "engine"),
     )
-    motion = rsfstudy.simulate(scene, duration=duration, **given.collect_option_values(*accuracy))
-    motion = motion.assign_attrs(build_provenance_attributes(given.command_line))
-    _write_motion_and_figure(motion, rig, given)
+    motion = rsfstudy.simulate(
+        scene, duration=duration, **command_options.collect_option_values(*accuracy)
+    )
+    motion = motion.assign_attrs(build_provenance_attributes(command_options.command_line))
+    _write_motion_and_figure(motion, rig, command_options)
     return _find_exit_status_of_motion(motion)
 
 
 def _find_exit_status_of_motion(motion: xr.Dataset) -> int:
     """Return the exit status for a motion."""
-    from rsfstudy.api import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME
+    from rsfstudy.api import UNPHYSICAL_MOTION_ATTRIBUTE_NAME
 
     if motion.attrs["status"] != Status.OK.label:
         return EXIT_STATUS_FAILED
-    unphysical = BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME in motion.attrs
+    unphysical = UNPHYSICAL_MOTION_ATTRIBUTE_NAME in motion.attrs
     return _EXIT_STATUS_UNPHYSICAL_MOTION if unphysical else EXIT_STATUS_OK
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.command_group import OptionsObjectCommand
+from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import (
     EXIT_STATUS_FAILED,
     EXIT_STATUS_OK,
@@ -45,14 +45,14 @@ class VerifyCommandResult(CommandResult):
         pairs = zip(self.answer_files, self.answer_comparisons, strict=True)
         return {
             "summary": summarise_answer_comparisons(self.answer_comparisons),
-            "files": [_answer_comparison_to_json(file, one) for file, one in pairs],
+            "files": [_convert_answer_comparison_to_json(file, one) for file, one in pairs],
         }
 
 
-def _answer_comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, Any]:
+def _convert_answer_comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, Any]:
     """Return the entry of the JSON output that describes one answer file."""
     problem = comparison.problem
-    index = problem.index_values if problem.index_column_name else None
+    index = problem.answer_index_values if problem.answer_index_column_name else None
     return {
         "file": file,
         "problem": problem.number or None,
@@ -62,7 +62,7 @@ def _answer_comparison_to_json(file: Path, comparison: AnswerComparison) -> dict
         "required_digits": comparison.required_digits,
         "reference_digits": problem.digits,
         "explanation": comparison.explanation_of_disagreement,
-        "index_column": problem.index_column_name or None,
+        "index_column": problem.answer_index_column_name or None,
         "quantities": [
             {
                 "name": one.quantity_name,
@@ -78,7 +78,7 @@ def _answer_comparison_to_json(file: Path, comparison: AnswerComparison) -> dict
     }
 
 
-@click.command(cls=OptionsObjectCommand)
+@click.command(cls=CommandWithOptionsObject)
 @click.argument(
     "files", metavar="FILE...", nargs=-1, required=True, type=options.PathParameterType()
 )
@@ -101,7 +101,7 @@ def _answer_comparison_to_json(file: Path, comparison: AnswerComparison) -> dict
     default=6.0,
     help="Number of correct digits that a file must have to pass.",
 )
-@options.make_image_option(
+@options.make_image_path_option(
     "--figure",
     None,
     "Draw a figure of the agreement between the solutions. The suffix of FILE must be "
@@ -109,7 +109,7 @@ def _answer_comparison_to_json(file: Path, comparison: AnswerComparison) -> dict
 )
 @options.figure_style_options
 @options.json_option
-def verify(given: options.CommandOptions) -> int:
+def verify(command_options: options.CommandOptions) -> int:
     """Compare the solutions of a different code with reference solutions.
 
     For each quantity, the command prints the number of correct digits. If the number of correct
@@ -119,20 +119,27 @@ def verify(given: options.CommandOptions) -> int:
     from rsfstudy.cli import assignment_parsing
     from rsfstudy.referee import compare_file_with_known_answer
 
-    if given.figure is None and (given.style, given.width) != (None, None):
+    if command_options.figure is None and (command_options.style, command_options.width) != (
+        None,
+        None,
+    ):
         raise click.UsageError("--style and --width require a figure. Add --figure FILE.")
-    if math.isnan(given.digits):  # Click accepts NaN for any range.
-        raise InvalidValue("--digits", given.digits, "must be a number, from 1 to 12")
-    columns = assignment_parsing.parse_column_assignments(given.columns)
+    if math.isnan(command_options.digits):  # Click accepts NaN for any range.
+        raise InvalidValue("--digits", command_options.digits, "must be a number, from 1 to 12")
+    columns = assignment_parsing.parse_column_assignments(command_options.columns)
     found = [
-        compare_file_with_known_answer(file, given.problem or "", columns, given.digits)
-        for file in given.files
+        compare_file_with_known_answer(
+            file, command_options.problem or "", columns, command_options.digits
+        )
+        for file in command_options.files
     ]
     status = print_result_as_text_or_json(
-        VerifyCommandResult(given.files, found), _print_verification, given.as_json
+        VerifyCommandResult(command_options.files, found),
+        _print_verification,
+        command_options.as_json,
     )
-    if given.figure is not None:
-        _write_agreement_figure(found, given)
+    if command_options.figure is not None:
+        _write_agreement_figure(found, command_options)
     return status
 
 
@@ -169,11 +176,11 @@ def _write_agreement_figure(
 
     digits: dict[str, list[tuple[float, float]]] = {}
     problem, label = answer_comparisons[0].problem, "problem"
-    if len(answer_comparisons) == 1 and problem.index_column_name:
-        label = f"{problem.index_column_name} ({problem.quantity_units[problem.index_column_name]})"
+    if len(answer_comparisons) == 1 and problem.answer_index_column_name:
+        label = f"{problem.answer_index_column_name} ({problem.si_units_by_quantity[problem.answer_index_column_name]})"
         for one in answer_comparisons[0].quantity_agreements:
             along = -np.log10(np.maximum(one.relative_differences, 10.0**-problem.digits))
-            digits[one.quantity_name] = list(zip(problem.index_values, along, strict=True))
+            digits[one.quantity_name] = list(zip(problem.answer_index_values, along, strict=True))
     else:
         for number, comparison in enumerate(answer_comparisons, start=1):
             at = comparison.problem.number or number

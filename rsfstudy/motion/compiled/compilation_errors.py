@@ -16,7 +16,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.parts import Part
 from rsfstudy.slider import NumericFunction
 
-_DEFAULT_SUBJECT_OF_ERROR_MESSAGES = "the equations"
+_ERROR_SUBJECT_FOR_UNKNOWN_PART = "the equations"
 _NUMBA_ERROR_LOCATION_PATTERN = re.compile(r'\n+File "(?P<file>.+?)", line (?P<line>\d+)')
 
 
@@ -51,7 +51,7 @@ def check_function_never_raises(
             code = function.__code__
             where = f"{function.__name__}, {code.co_filename}, line {code.co_firstlineno}"
             rule = (
-                f"cannot compile {_describe_parts_defined_in_file(code.co_filename)} ({where}): it "
+                f"cannot compile {_describe_scene_parts_in_file(code.co_filename)} ({where}): it "
                 "raises an error"
             )
             remedy = "Return math.nan instead, which ends the motion, or use engine='scipy'."
@@ -75,16 +75,16 @@ def build_compilation_error(numba_error: Exception) -> InvalidValue:
     InvalidValue
         Error with a message for the user.
     """
-    text, what, where = str(numba_error), _DEFAULT_SUBJECT_OF_ERROR_MESSAGES, ""
+    text, what, where = str(numba_error), _ERROR_SUBJECT_FOR_UNKNOWN_PART, ""
     places = list(_NUMBA_ERROR_LOCATION_PATTERN.finditer(text))
     of_parts = [
         place
         for place in places
-        if _describe_parts_defined_in_file(place["file"]) != _DEFAULT_SUBJECT_OF_ERROR_MESSAGES
+        if _describe_scene_parts_in_file(place["file"]) != _ERROR_SUBJECT_FOR_UNKNOWN_PART
     ]
     for place in (of_parts or places)[:1]:
         what, where = (
-            _describe_parts_defined_in_file(place["file"]),
+            _describe_scene_parts_in_file(place["file"]),
             f" ({place['file']}, line {place['line']})",
         )
         text = text[: place.start()]
@@ -94,25 +94,25 @@ def build_compilation_error(numba_error: Exception) -> InvalidValue:
     return InvalidValue("engine", "compiled", rule, remedy=remedy)
 
 
-def _describe_parts_defined_in_file(source_file: str) -> str:
+def _describe_scene_parts_in_file(source_file: str) -> str:
     """Return a phrase that lists the parts in a source file, for error messages."""
     names = [
         part.name
-        for part in _iterate_named_part_subclasses()
-        if _find_source_file_of_part(part) == _resolve_path(source_file)
+        for part in _iterate_named_scene_part_classes()
+        if _find_source_file_of_scene_part(part) == _resolve_path(source_file)
     ]
-    return f"the part {' or '.join(names)}" if names else _DEFAULT_SUBJECT_OF_ERROR_MESSAGES
+    return f"the part {' or '.join(names)}" if names else _ERROR_SUBJECT_FOR_UNKNOWN_PART
 
 
-def _iterate_named_part_subclasses(base_class: type[Part] = Part) -> Iterator[type[Part]]:
+def _iterate_named_scene_part_classes(base_class: type[Part] = Part) -> Iterator[type[Part]]:
     """Yield all scene part classes defined in this process, latest first."""
     for part in reversed(base_class.__subclasses__()):
-        yield from _iterate_named_part_subclasses(part)
+        yield from _iterate_named_scene_part_classes(part)
         if "name" in vars(part):
             yield part
 
 
-def _find_source_file_of_part(part_class: type[Part]) -> Path | None:
+def _find_source_file_of_scene_part(part_class: type[Part]) -> Path | None:
     """Return the source file of a part class, or None for a notebook class."""
     try:
         return _resolve_path(inspect.getfile(part_class))

@@ -42,7 +42,7 @@ from rsfstudy.object_digest import ObjectDigest, list_global_names_read_by_code
 _PLACEHOLDER_SOURCE_FILE_NAME = "motion.py"
 #: Modules whose code is not part of a digest. Instead of the code, the digest contains the version
 #: of the module or the version of Python.
-_PACKAGES_IDENTIFIED_BY_VERSION_ONLY = {*sys.stdlib_module_names, "numpy", "numba"}
+_PACKAGES_DIGESTED_BY_VERSION_ONLY = {*sys.stdlib_module_names, "numpy", "numba"}
 #: The fast-math flags permit reciprocals instead of divisions, and fused multiply-add operations.
 #: With these flags, the compiler can compute reciprocals of the parameters once per step.
 _COMPILER_OPTIONS: Mapping[str, Any] = {
@@ -71,7 +71,7 @@ def get_compile_cache_folder() -> Path:
     return Path(home) / "rsfstudy" / "compiled"
 
 
-def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
+def compute_code_digest(numba_signature: Any, *functions: Callable[..., Any]) -> str:
     """Compute a digest of functions and their compilation options.
 
     Parameters
@@ -93,24 +93,24 @@ def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
     ]
     versions = _CACHE_FORMAT_VERSION, numba.__version__, np.__version__
     settings = repr(
-        (signature, versions, str(config.CPU_NAME), str(config.OPT), processor, options)
+        (numba_signature, versions, str(config.CPU_NAME), str(config.OPT), processor, options)
     )
     return _digest_functions_and_callees(*functions).add_object(settings).hexdigest(32)
 
 
 def _digest_functions_and_callees(*functions: Callable[..., Any]) -> ObjectDigest:
     """Compute a digest of functions and of the functions that they call."""
-    return ObjectDigest(_is_module_code_digested, _replace_by_compiled_function).add_object(
+    return ObjectDigest(_is_module_code_digested, _get_compiled_replacement_or_itself).add_object(
         functions
     )
 
 
 def _is_module_code_digested(module_name: str | None) -> bool:
     """Return True if digests include the source code of a module."""
-    return (module_name or "").partition(".")[0] not in _PACKAGES_IDENTIFIED_BY_VERSION_ONLY
+    return (module_name or "").partition(".")[0] not in _PACKAGES_DIGESTED_BY_VERSION_ONLY
 
 
-def compile_or_load_function(function: Callable[..., Any], signature: Any) -> Any:
+def compile_or_load_function(function: Callable[..., Any], numba_signature: Any) -> Any:
     """Compile a function, or load it from the cache.
 
     Parameters
@@ -131,10 +131,10 @@ def compile_or_load_function(function: Callable[..., Any], signature: Any) -> An
         dispatcher = numba.njit(copy, **_COMPILER_OPTIONS)
         if entry:
             dispatcher._cache = _ContentKeyedCache(copy)
-        dispatcher.compile(signature)
+        dispatcher.compile(numba_signature)
         return dispatcher
 
-    return _load_or_compile_cache_entry(compute_code_digest(signature, function), compile_for)
+    return _load_or_compile_cache_entry(compute_code_digest(numba_signature, function), compile_for)
 
 
 def compile_cfuncs_and_get_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...]:
@@ -204,7 +204,7 @@ def _load_or_compile_cache_entry(
                 return compile_with_cache_path(str(folder / _PLACEHOLDER_SOURCE_FILE_NAME))
         shutil.rmtree(folder, ignore_errors=True)
     began = time.perf_counter()
-    with compilation_log.create_compilation_context():
+    with compilation_log.compilation_context_factory():
         try:
             return (
                 compile_with_cache_path("")
@@ -313,7 +313,7 @@ def _is_python_function(value: Any) -> bool:
     return isinstance(value, types.FunctionType)
 
 
-def _replace_by_compiled_function(value: Any) -> Any:
+def _get_compiled_replacement_or_itself(value: Any) -> Any:
     """Replace a function by its compiled version. Return other values unchanged."""
     return (
         COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION.get(value, value)
@@ -327,11 +327,11 @@ def _jit_compile_callee(function: Any) -> Any:
 
     A function that is called by several systems of equations is compiled only once.
     """
-    return _jit_compile_callee_once(_replace_by_compiled_function(function))
+    return _jit_compile_callee_cached(_get_compiled_replacement_or_itself(function))
 
 
 @functools.cache
-def _jit_compile_callee_once(function: Any) -> Any:
+def _jit_compile_callee_cached(function: Any) -> Any:
     """Compile a function without the wrappers for calls from Python or C."""
     inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return numba.njit(_copy_function_with_compiled_callees(function), **_COMPILER_OPTIONS, **inner)

@@ -174,7 +174,7 @@ class NumbaMotionState:
         array_layout.CALL_FORMAT.pack_into(self._bytes, 0, *called_with)
         self.motion_state_array = np.frombuffer(self._bytes, array_layout.MOTION_STATE_DTYPE)
 
-    def get_work_and_row_counts(self) -> tuple[int, ...]:
+    def get_work_and_table_row_counts(self) -> tuple[int, ...]:
         """Return the counters of evaluations, steps and table rows.
 
         Returns
@@ -185,7 +185,7 @@ class NumbaMotionState:
         """
         return array_layout.COUNTER_FORMAT.unpack_from(self._bytes, array_layout.CALL_FORMAT.size)
 
-    def set_remaining_kink_count(self, count: int) -> None:
+    def set_remaining_loading_kink_count(self, count: int) -> None:
         """Set the number of remaining kinks.
 
         Parameters
@@ -195,7 +195,7 @@ class NumbaMotionState:
         """
         self.motion_state_array["kinks_ahead"] = count
 
-    def get_state_field(self, field_name: str) -> float:
+    def get_motion_state_field(self, field_name: str) -> float:
         """Return the value of a field of the motion state.
 
         Parameters
@@ -211,7 +211,7 @@ class NumbaMotionState:
         return float(self.motion_state_array[field_name][0])
 
 
-def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
+def compile_equations_of_scene(scene: Scene, *, include_time_equation: bool) -> None:
     """Compile the equations of a scene, or load them from the cache.
 
     Parameters
@@ -228,10 +228,12 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
         If a part of the scene cannot be compiled.
     """
     compile_or_load_motion_loop()
-    get_compiled_function_addresses(scene.equations_between_ruptures(with_time=with_time))
+    get_compiled_function_addresses(
+        scene.equations_between_ruptures(with_time=include_time_equation)
+    )
     if scene.has_mass:
-        get_compiled_function_addresses(scene.equations_in_rupture(with_time=with_time))
-    if scene.has_mass and not with_time:
+        get_compiled_function_addresses(scene.equations_in_rupture(with_time=include_time_equation))
+    if scene.has_mass and not include_time_equation:
         get_compiled_function_addresses(scene.equations_without_mass(with_time=False))
 
 
@@ -255,7 +257,7 @@ def _build_function_address_table(
 
     Both rows of the table contain the force balance function of the slow manifold.
     """
-    rows = np.zeros((2, array_layout.FUNCTION_COUNT_PER_REGIME), dtype=np.int64)
+    rows = np.zeros((2, array_layout.FUNCTION_TABLE_COLUMN_COUNT), dtype=np.int64)
     (
         rows[array_layout.SLOW_REGIME, : len(slow_regime_addresses)],
         rows[array_layout.FAST_REGIME, : len(fast_regime_addresses)],
@@ -301,13 +303,13 @@ def compile_function_of_floats(function: NumericFunction, *arguments: float | Fl
     InvalidValue
         If the function cannot be compiled or contains a raise statement.
     """
-    return _compile_function_of_floats_once(
+    return _compile_function_of_floats_cached(
         function, *[len(x) if isinstance(x, tuple) else 0 for x in arguments]
     )
 
 
 @cache
-def _compile_function_of_floats_once(function: NumericFunction, *argument_lengths: int) -> Any:
+def _compile_function_of_floats_cached(function: NumericFunction, *argument_lengths: int) -> Any:
     """Compile a function whose arguments are floats or tuples of given lengths."""
     check_function_never_raises(function)
     floats = (types.UniTuple(types.float64, n) if n else types.float64 for n in argument_lengths)
@@ -360,20 +362,20 @@ def get_compiled_function_addresses(equations: EquationsOfMotion) -> tuple[int, 
     )
 
 
-_COMPILED_ADDRESSES_BY_FUNCTIONS: dict[tuple[Any, ...], tuple[int, ...]] = {}
+_COMPILED_FUNCTION_ADDRESS_CACHE: dict[tuple[Any, ...], tuple[int, ...]] = {}
 
 
 def _compile_functions_or_reuse_addresses(
     functions: tuple[Any, ...], equations: EquationsOfMotion
 ) -> tuple[int, ...]:
     """Compile functions that fill arrays, unless they are already compiled."""
-    if functions not in _COMPILED_ADDRESSES_BY_FUNCTIONS:
+    if functions not in _COMPILED_FUNCTION_ADDRESS_CACHE:
         for function in (equations.rate_function, equations.motion_point_function):
             check_function_never_raises(function)
         try:
-            _COMPILED_ADDRESSES_BY_FUNCTIONS[functions] = compile_cfuncs_and_get_addresses(
+            _COMPILED_FUNCTION_ADDRESS_CACHE[functions] = compile_cfuncs_and_get_addresses(
                 functions
             )
         except NumbaError as error:
             raise build_compilation_error(error) from error
-    return _COMPILED_ADDRESSES_BY_FUNCTIONS[functions]
+    return _COMPILED_FUNCTION_ADDRESS_CACHE[functions]

@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_members
+from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_overrides
 from rsfstudy.slider import EquationsOfMotion
 
 #: Return values of ``Stepper.attempt_step`` if no step was taken: the step size is too small, or
@@ -49,7 +49,7 @@ class Stepper(ABC):
     def __init_subclass__(cls) -> None:
         """Add the former names of renamed methods to the subclass."""
         super().__init_subclass__()
-        add_new_names_for_former_members(cls)
+        add_new_names_for_former_overrides(cls)
 
     def __init__(self, systems: tuple[EquationsOfMotion, ...], methods: Mapping[str, str]) -> None:
         self.systems, self.failure = systems, "the step size became too small"
@@ -118,7 +118,9 @@ class Stepper(ABC):
         return 0.0
 
     @abstractmethod
-    def interpolate_unknowns(self, motion: Any, workspace: Any, clock: float) -> None:
+    def interpolate_unknowns(
+        self, motion: Any, workspace: Any, independent_variable: float
+    ) -> None:
         """Fill in the unknowns ``workspace.y_within`` within the step.
 
         Parameters
@@ -132,7 +134,7 @@ class Stepper(ABC):
         """
 
     @abstractmethod
-    def retake_step(self, motion: Any, workspace: Any, clock: float) -> None:
+    def retake_step(self, motion: Any, workspace: Any, independent_variable: float) -> None:
         """Repeat the step with an earlier end.
 
         The method must set the same fields as ``attempt_step``.
@@ -202,7 +204,7 @@ def step_to_segment_end(motion, workspace, approximate_length):
     return workspace.stepper.step_to_segment_end(motion, workspace, approximate_length)
 
 
-def interpolate_unknowns(motion, workspace, clock):
+def interpolate_unknowns(motion, workspace, independent_variable):
     """Let the stepper interpolate the unknowns within the step.
 
     Parameters
@@ -214,10 +216,10 @@ def interpolate_unknowns(motion, workspace, clock):
     clock : float
         Value of the independent variable between the beginning and the end of the step.
     """
-    workspace.stepper.interpolate_unknowns(motion, workspace, clock)
+    workspace.stepper.interpolate_unknowns(motion, workspace, independent_variable)
 
 
-def retake_step(motion, workspace, clock):
+def retake_step(motion, workspace, independent_variable):
     """Let the stepper repeat the step with an earlier end.
 
     Parameters
@@ -229,4 +231,4 @@ def retake_step(motion, workspace, clock):
     clock : float
         Independent variable at the new end of the step.
     """
-    workspace.stepper.retake_step(motion, workspace, clock)
+    workspace.stepper.retake_step(motion, workspace, independent_variable)

@@ -213,7 +213,7 @@ def take_step_with_time_as_variable(motion, workspace):
     return length * fifth / math.sqrt(both * count) if both != 0.0 else 0.0
 
 
-def retake_step(motion, workspace, clock):
+def retake_step(motion, workspace, independent_variable):
     """Repeat the step with an earlier end.
 
     See ``Stepper.retake_step``.
@@ -227,12 +227,16 @@ def retake_step(motion, workspace, clock):
     clock : float
         Independent variable at the new end of the step.
     """
-    motion.end, motion.step_length, motion.is_dense = clock, clock - motion.clock, 0
+    motion.end, motion.step_length, motion.is_dense = (
+        independent_variable,
+        independent_variable - motion.clock,
+        0,
+    )
     motion.time_per_step = 0.0
     take_step_without_error_test(motion, workspace)
 
 
-def interpolate_unknowns(motion, workspace, clock):
+def interpolate_unknowns(motion, workspace, independent_variable):
     """Interpolate the unknowns within the step with dense output.
 
     See ``Stepper.interpolate_unknowns``.
@@ -250,7 +254,7 @@ def interpolate_unknowns(motion, workspace, clock):
         prepare_dense_output(motion, workspace, motion.step_length)
         count_evaluations(motion, EXTRA_STAGE_COUNT)
         motion.is_dense = 1
-    evaluate_dense_output(workspace, (clock - motion.clock) / motion.step_length)
+    evaluate_dense_output(workspace, (independent_variable - motion.clock) / motion.step_length)
 
 
 def increase_step_length(length, error_over_tolerance, was_rejected_before):

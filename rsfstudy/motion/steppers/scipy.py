@@ -74,7 +74,7 @@ class SciPyStepper(Stepper):
 
     def __init__(self, systems: tuple[EquationsOfMotion, ...], methods: Mapping[str, str]) -> None:
         super().__init__(systems, methods)
-        names = (methods.get(system.regime, DEFAULT_SCIPY_METHOD) for system in systems)
+        names = (methods.get(system.regime_name, DEFAULT_SCIPY_METHOD) for system in systems)
         self._methods = [SCIPY_SOLVER_BY_METHOD_NAME[name] for name in names]
         self._solver: Any = None
         self._interpolant: Any = None
@@ -136,27 +136,33 @@ class SciPyStepper(Stepper):
         taken: float = order_eight.step_to_segment_end(motion, workspace, approximate_length)  # type: ignore[no-untyped-call]
         return taken
 
-    def interpolate_unknowns(self, motion: Any, workspace: Any, clock: float) -> None:
+    def interpolate_unknowns(
+        self, motion: Any, workspace: Any, independent_variable: float
+    ) -> None:
         """Interpolate the unknowns with the dense output of the solver.
 
         See ``Stepper.interpolate_unknowns``.
         """
         if motion.time_per_step > 0.0:
-            order_eight.interpolate_unknowns(motion, workspace, clock)  # type: ignore[no-untyped-call]
+            order_eight.interpolate_unknowns(motion, workspace, independent_variable)  # type: ignore[no-untyped-call]
             return
         if self._interpolant is None:
             self._interpolant = _build_interpolant_of_unknowns(self._solver.dense_output())
-        for i, unknown in enumerate(self._interpolant(clock)):
+        for i, unknown in enumerate(self._interpolant(independent_variable)):
             workspace.y_within[i] = unknown
 
-    def retake_step(self, motion: Any, workspace: Any, clock: float) -> None:
+    def retake_step(self, motion: Any, workspace: Any, independent_variable: float) -> None:
         """Repeat the step with a new solver.
 
         The solver may need several steps to reach the new end. See ``Stepper.retake_step``.
         """
         begin, motion.time_per_step = np.array(workspace.y[: workspace.unknown_count]), 0.0
         # A SciPy solver rejects an interval of zero length, which can result from rounding.
-        end = clock if clock != motion.clock else np.nextafter(clock, motion.direction * np.inf)
+        end = (
+            independent_variable
+            if independent_variable != motion.clock
+            else np.nextafter(independent_variable, motion.direction * np.inf)
+        )
         length, ends = abs(end - motion.clock), (motion.clock, end)
         self._solver = solver = self._create_solver(
             motion, workspace, ends, begin, first_step=length
@@ -169,7 +175,7 @@ class SciPyStepper(Stepper):
                 )
             clocks.append(solver.t)
             within.append(solver.dense_output())
-        motion.end, motion.step_length = clock, clock - motion.clock
+        motion.end, motion.step_length = independent_variable, independent_variable - motion.clock
         self._interpolant = (
             OdeSolution(clocks, within)
             if len(within) > 1

@@ -80,7 +80,7 @@ def _build_step_attempt_factory(unknown_count: int) -> AnyCallable:
     for s in range(1, STAGE_COUNT + 1):
         unknown, rates = (", ".join(f"{x}{i}" for i in n) for x in ("z", f"k{s}_"))
         lines += [
-            *(f"z{i} = y{i} + length * {_write_weighted_sum_call(f'stage_{s}', i)}" for i in n),
+            *(f"z{i} = y{i} + length * {_generate_weighted_sum_call(f'stage_{s}', i)}" for i in n),
             f"{rates}, = rate_of(({unknown},), of_scene)",
             *(f"stages[{s * unknown_count + i}] = k{s}_{i}" for i in n),
         ]
@@ -88,8 +88,8 @@ def _build_step_attempt_factory(unknown_count: int) -> AnyCallable:
         lines += [
             f"step[{HEADER_SIZE + i}] = z{i}",
             f"allowed = tolerance * (step[{scales + i}] + max(abs(y{i}), abs(z{i})))",
-            f"fifth{i} = {_write_weighted_sum_call('error_of_fifth', i)} / allowed",
-            f"third{i} = {_write_weighted_sum_call('error_of_third', i)} / allowed",
+            f"fifth{i} = {_generate_weighted_sum_call('error_of_fifth', i)} / allowed",
+            f"third{i} = {_generate_weighted_sum_call('error_of_third', i)} / allowed",
         ]
     lines += [
         f"fifth = {' + '.join(f'fifth{i} * fifth{i}' for i in n)}",
@@ -113,26 +113,26 @@ def _compile_weighted_sum_functions() -> dict[str, Any]:
     return {
         name: _compile_function_from_source(
             name,
-            _write_weighted_sum_arguments(name),
-            [f"return {_write_weighted_sum_expression(name)}"],
+            _generate_weighted_sum_arguments(name),
+            [f"return {_generate_weighted_sum_expression(name)}"],
             {},
         )
         for name in _RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME
     }
 
 
-def _write_weighted_sum_call(sum_name: str, unknown_index: int) -> str:
+def _generate_weighted_sum_call(sum_name: str, unknown_index: int) -> str:
     """Return the source code of a weighted sum for one unknown."""
-    rates = _write_weighted_sum_arguments(sum_name).split(", ")
+    rates = _generate_weighted_sum_arguments(sum_name).split(", ")
     return f"{sum_name}({', '.join(f'{rate}_{unknown_index}' for rate in rates)})"
 
 
-def _write_weighted_sum_arguments(sum_name: str) -> str:
+def _generate_weighted_sum_arguments(sum_name: str) -> str:
     """Return the source code of the argument list of a weighted sum."""
     return ", ".join(f"k{s}" for s in np.flatnonzero(_RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME[sum_name]))
 
 
-def _write_weighted_sum_expression(sum_name: str) -> str:
+def _generate_weighted_sum_expression(sum_name: str) -> str:
     """Return the source code of the expression of a weighted sum."""
     return " + ".join(
         f"{float(x)!r} * k{s}"

@@ -25,7 +25,7 @@ from rsfstudy.rig.readers.arrays_and_netcdf import (
 from rsfstudy.rig.readers.compressed_files import decompress_file, is_compressed_file
 from rsfstudy.rig.readers.matlab_files import is_matlab_file, read_matlab_file
 from rsfstudy.rig.readers.spreadsheets import is_workbook, read_workbook
-from rsfstudy.rig.readers.table_sources import SourceTable, TableSource
+from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
 from rsfstudy.rig.readers.tdms_files import is_tdms_file, read_tdms_file
 from rsfstudy.rig.readers.text_files import is_text_file, read_text_file
 from rsfstudy.rig.readers.unsupported_formats import (
@@ -38,7 +38,7 @@ from rsfstudy.rig.readers.xlook_files import is_binary_file, read_xlook_file
 #: source, and the second function reads the source. A reader of compressed files returns a source
 #: with the decompressed bytes.
 FORMAT_TESTS_AND_READERS: list[
-    tuple[Callable[[TableSource], bool], Callable[[TableSource], SourceTable | TableSource]]
+    tuple[Callable[[TableSource], bool], Callable[[TableSource], LazyTable | TableSource]]
 ] = [
     (is_record_object, read_columns_of_record),
     (is_xarray_dataset, read_xarray_dataset),
@@ -56,7 +56,7 @@ FORMAT_TESTS_AND_READERS: list[
 
 def read_table_from_source(
     path_or_object: Any, *, decimal_separator: str = ".", sheet_or_group_name: str = ""
-) -> SourceTable:
+) -> LazyTable:
     """Read a table from a file or an object in any known format.
 
     Parameters
@@ -87,13 +87,13 @@ def read_table_from_source(
     )
 
 
-def _read_with_first_matching_reader(source: TableSource) -> SourceTable:
+def _read_with_first_matching_reader(source: TableSource) -> LazyTable:
     """Read a source with the first reader that recognises it."""
     for recognises, read in FORMAT_TESTS_AND_READERS:
         if recognises(source):
             found = read(source)
             return (
-                found if isinstance(found, SourceTable) else _read_with_first_matching_reader(found)
+                found if isinstance(found, LazyTable) else _read_with_first_matching_reader(found)
             )
     if source.is_file:
         raise DataError(

@@ -14,7 +14,7 @@ import xarray as xr
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import RECORD_COLUMNS, Record
 from rsfstudy.rig.columns import Column
-from rsfstudy.rig.readers.table_sources import SourceTable, TableSource, append_units_to_headings
+from rsfstudy.rig.readers.table_sources import LazyTable, TableSource, append_units_to_headings
 
 _NETCDF_SIGNATURES = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n")
 
@@ -37,7 +37,7 @@ def is_mapping_or_dataframe(source: TableSource) -> bool:
     )
 
 
-def read_mapping_or_dataframe(source: TableSource) -> SourceTable:
+def read_mapping_or_dataframe(source: TableSource) -> LazyTable:
     """Build a table from a mapping of arrays or from a DataFrame.
 
     Parameters
@@ -74,7 +74,7 @@ def is_xarray_dataset(source: TableSource) -> bool:
     return isinstance(source.path_or_object, xr.Dataset)
 
 
-def read_xarray_dataset(source: TableSource) -> SourceTable:
+def read_xarray_dataset(source: TableSource) -> LazyTable:
     """Build a table from the variables and coordinates of an xarray Dataset.
 
     Parameters
@@ -106,7 +106,7 @@ def is_netcdf_file(source: TableSource) -> bool:
     return source.first_bytes_of_file.startswith(_NETCDF_SIGNATURES)
 
 
-def read_netcdf_file(source: TableSource) -> SourceTable:
+def read_netcdf_file(source: TableSource) -> LazyTable:
     """Read the variables of a NetCDF file.
 
     Parameters
@@ -152,7 +152,7 @@ def is_record_object(source: TableSource) -> bool:
     return isinstance(source.path_or_object, Record)
 
 
-def read_columns_of_record(source: TableSource) -> SourceTable:
+def read_columns_of_record(source: TableSource) -> LazyTable:
     """Build a table from the columns of a ``Record``.
 
     Parameters
@@ -171,7 +171,7 @@ def read_columns_of_record(source: TableSource) -> SourceTable:
     return _build_table_of_mapping(columns, [*columns], headings)
 
 
-def _build_table_of_dataset(dataset: xr.Dataset) -> SourceTable:
+def _build_table_of_dataset(dataset: xr.Dataset) -> LazyTable:
     names: list[Hashable] = [name for name, of in dataset.variables.items() if of.ndim == 1]
     units = [str(dataset[name].attrs.get("units", "")) for name in names]
     table = _build_table_of_mapping(
@@ -180,7 +180,7 @@ def _build_table_of_dataset(dataset: xr.Dataset) -> SourceTable:
     return replace(table, uses_default_units=not any(units))
 
 
-def _build_table_of_mapping(mapping: Any, keys: list[Any], headings: list[str]) -> SourceTable:
+def _build_table_of_mapping(mapping: Any, keys: list[Any], headings: list[str]) -> LazyTable:
     """Build a table whose columns are the values of a mapping."""
 
     def load(index: int, quantity_name: str) -> Column:
@@ -189,7 +189,7 @@ def _build_table_of_mapping(mapping: Any, keys: list[Any], headings: list[str]) 
             raise InvalidValue(quantity_name, values.shape, "must have one dimension")
         return Column(values, units)
 
-    return SourceTable(headings, "record", load)
+    return LazyTable(headings, "record", load)
 
 
 def _convert_to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:

@@ -24,7 +24,7 @@ _OPEN_FUNCTION_BY_FILE_SIGNATURE: dict[bytes, Callable[[Any], Any]] = {
 #: decompression. The maximum ratio applies only to files that are longer than a mebibyte after
 #: decompression.
 _MAX_DECOMPRESSED_BYTES, _MAX_COMPRESSION_RATIO = 2**31, 200
-_MIN_BYTES_FOR_COMPRESSION_RATIO = 2**20
+_MIN_BYTES_TO_CHECK_COMPRESSION_RATIO = 2**20
 
 
 def is_compressed_file(source: TableSource) -> bool:
@@ -68,7 +68,7 @@ def decompress_file(source: TableSource) -> TableSource:
     opener = next(
         of for mark, of in _OPEN_FUNCTION_BY_FILE_SIGNATURE.items() if data.startswith(mark)
     )
-    limit = max(_MIN_BYTES_FOR_COMPRESSION_RATIO, _MAX_COMPRESSION_RATIO * len(data))
+    limit = max(_MIN_BYTES_TO_CHECK_COMPRESSION_RATIO, _MAX_COMPRESSION_RATIO * len(data))
     limit = min(limit, _MAX_DECOMPRESSED_BYTES)
     try:
         with opener(io.BytesIO(data)) as file:

@@ -12,7 +12,7 @@ import numpy as np
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.readers.matlab_elements import read_numeric_arrays
 from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
-from rsfstudy.rig.readers.table_sources import SourceTable, TableSource, build_table_of_arrays
+from rsfstudy.rig.readers.table_sources import LazyTable, TableSource, build_table_of_arrays
 
 _SIGNATURE_5, _SIGNATURE_7_3 = b"MATLAB 5.0", b"MATLAB 7.3"
 #: Maximum depth of nested structures, and maximum number of columns of a matrix.
@@ -35,7 +35,7 @@ def is_matlab_file(source: TableSource) -> bool:
     return source.first_bytes_of_file.startswith((_SIGNATURE_5, _SIGNATURE_7_3))
 
 
-def read_matlab_file(source: TableSource) -> SourceTable:
+def read_matlab_file(source: TableSource) -> LazyTable:
     """Read the numeric arrays of a MATLAB file.
 
     The columns of the table are the vectors and the columns of matrices. The headings are the names

@@ -7,7 +7,7 @@ from rsfstudy.rig.readers.table_sources import TableSource
 
 
 def build_missing_library_error(
-    source: TableSource, format_name: str, extra_name: str, library_name: str
+    source: TableSource, format_name: str, pip_extra_name: str, library_name: str
 ) -> DataError:
     """Return the error for a file that requires an uninstalled library.
 
@@ -30,5 +30,5 @@ def build_missing_library_error(
     return DataError(
         f"{source.path_or_object}: is {format_name}, which requires the library "
         f"{library_name}. Install the "
-        f"library: pip install 'rsfstudy[{extra_name}]'."
+        f"library: pip install 'rsfstudy[{pip_extra_name}]'."
     )

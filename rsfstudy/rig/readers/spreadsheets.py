@@ -14,7 +14,7 @@ import pandas as pd
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
-from rsfstudy.rig.readers.table_sources import SourceTable, TableSource
+from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
 from rsfstudy.rig.readers.text_layout import detect_text_layout
 from rsfstudy.rig.units import parse_number
 
@@ -57,7 +57,7 @@ def is_workbook(source: TableSource) -> bool:
     )
 
 
-def read_workbook(source: TableSource) -> SourceTable:
+def read_workbook(source: TableSource) -> LazyTable:
     """Read a table from a sheet of a workbook.
 
     Parameters
@@ -132,7 +132,7 @@ def _list_zip_members_and_sizes(source: TableSource) -> list[tuple[str, int]]:
 
 def _build_table_of_cells(
     cells: pd.DataFrame, sheet_description: str, decimal_separator: str
-) -> SourceTable:
+) -> LazyTable:
     """Detect the header in the cells of a sheet, and build a table of the cells below it."""
     cells = cells.dropna(axis="columns", how="all")
     numbers = cells.columns.to_numpy() + 1
@@ -170,7 +170,7 @@ def _build_table_of_cells(
         if has_headings
         else sheet_description
     )
-    return SourceTable(layout.headings, location, load, has_headings)
+    return LazyTable(layout.headings, location, load, has_headings)
 
 
 def _format_cell_on_one_line(cell: object) -> str:

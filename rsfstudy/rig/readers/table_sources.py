@@ -92,7 +92,7 @@ class TableSource:
 
 
 @dataclass(frozen=True, eq=False)
-class SourceTable:
+class LazyTable:
     """Columns of a source, which are converted to numbers when selected.
 
     Parameters
@@ -122,9 +122,9 @@ class SourceTable:
 
     headings: Sequence[str]
     heading_location: str
-    load_column: Callable[[int, str], Column]
+    load_numeric_column: Callable[[int, str], Column]
     has_headings: bool = True
-    uses_default_units: bool = False
+    columns_have_no_units: bool = False
     headings_are_column_names: bool = False
     _column_indices_by_heading: dict[str, list[int]] = field(default_factory=dict, init=False)
 
@@ -223,7 +223,7 @@ class SourceTable:
             raise InvalidValue(
                 quantity_name, units, f"contradicts the units in the file, {of_file}", remedy=remedy
             ).with_location(self.heading_location)
-        column = self.load_column(index, quantity_name)
+        column = self.load_numeric_column(index, quantity_name)
         values = column.values
         if (scale, offset) != (1.0, 0.0):
             values = values * scale + offset
@@ -256,8 +256,11 @@ def append_units_to_headings(headings: Sequence[str], units: Sequence[str]) -> l
 
 
 def build_table_of_arrays(
-    headings: Sequence[str], column_arrays: Sequence[np.ndarray], location: str, path: str = ""
-) -> SourceTable:
+    headings: Sequence[str],
+    column_arrays: Sequence[np.ndarray],
+    heading_location: str,
+    path: str = "",
+) -> LazyTable:
     """Build a table of numeric arrays.
 
     Parameters
@@ -282,8 +285,8 @@ def build_table_of_arrays(
         if array.dtype.kind not in "fiub":
             raise InvalidValue(
                 quantity_name, array.dtype.name, "must be real numbers"
-            ).with_location(f"{location}, column {index + 1}")
+            ).with_location(f"{heading_location}, column {index + 1}")
         rows = np.arange(1, len(array) + 1)
         return Column(array.astype(float), "", index + 1, rows, path)
 
-    return SourceTable(headings, location, load)
+    return LazyTable(headings, heading_location, load)

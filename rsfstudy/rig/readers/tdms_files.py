@@ -12,7 +12,7 @@ import numpy as np
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
 from rsfstudy.rig.readers.table_sources import (
-    SourceTable,
+    LazyTable,
     TableSource,
     append_units_to_headings,
     build_table_of_arrays,
@@ -40,7 +40,7 @@ def is_tdms_file(source: TableSource) -> bool:
     return source.first_bytes_of_file.startswith(_TDMS_FILE_SIGNATURE)
 
 
-def read_tdms_file(source: TableSource) -> SourceTable:
+def read_tdms_file(source: TableSource) -> LazyTable:
     """Read the channels of a group of a TDMS file.
 
     If the channels are waveforms, a column ``Time (s)`` is added.

@@ -13,10 +13,10 @@ import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
-from rsfstudy.rig.readers.table_sources import SourceTable, TableSource
+from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
 from rsfstudy.rig.readers.text_layout import (
-    BLANK_DELIMITER,
     COMMENT_LINE_PREFIXES,
+    WHITESPACE_DELIMITER,
     TextLayout,
     detect_text_layout,
     is_line_without_data,
@@ -57,7 +57,7 @@ class _TextFileRows(NamedTuple):
         Line number of each row.
     """
 
-    numbers: np.ndarray | None
+    numeric_values: np.ndarray | None
     field_texts: list[list[str]]
     line_numbers: np.ndarray
 
@@ -84,7 +84,7 @@ def is_text_file(source: TableSource) -> bool:
     return b"\0" not in head and controls <= _MAX_FRACTION_OF_CONTROL_CHARACTERS * len(head)
 
 
-def read_text_file(source: TableSource) -> SourceTable:
+def read_text_file(source: TableSource) -> LazyTable:
     """Read a table from a text file.
 
     The columns may be separated by commas, semicolons, tabs or blanks.
@@ -130,15 +130,15 @@ def read_text_file(source: TableSource) -> SourceTable:
 
     def load(index: int, quantity_name: str) -> Column:
         column = Column(np.empty(0), "", index + 1, rows.line_numbers, name)
-        if rows.numbers is not None:
-            return column._replace(values=rows.numbers[:, index])
+        if rows.numeric_values is not None:
+            return column._replace(values=rows.numeric_values[:, index])
         convert = _FieldToNumberConverter(quantity_name, column, source.decimal_separator)
         values = [
             convert.convert_to_number(row[index], n) for n, row in enumerate(rows.field_texts)
         ]
         return column._replace(values=np.array(values, dtype=float))
 
-    table = SourceTable(layout.headings, location, load, has_headings)
+    table = LazyTable(layout.headings, location, load, has_headings)
     _check_row_lengths(rows, layout, name)
     return table
 
@@ -185,8 +185,8 @@ def _read_numeric_rows_with_pandas(
     If the table contains other characters, the function returns None, and the table must be read
     line by line.
     """
-    start = _find_start_of_line(file_bytes, layout.first_line_number_after_header)
-    delimiter = r"\s+" if layout.delimiter == BLANK_DELIMITER else layout.delimiter
+    start = _find_byte_offset_of_line(file_bytes, layout.first_line_number_after_header)
+    delimiter = r"\s+" if layout.delimiter == WHITESPACE_DELIMITER else layout.delimiter
     allowed = (
         _CHARACTERS_OF_PLAIN_NUMERIC_TABLES + decimal_separator.encode() + layout.delimiter.encode()
     )
@@ -213,7 +213,7 @@ def _read_numeric_rows_with_pandas(
     return _TextFileRows(numbers, [], lines) if len(lines) == len(numbers) else None
 
 
-def _find_start_of_line(file_bytes: bytes, line_number: int) -> int:
+def _find_byte_offset_of_line(file_bytes: bytes, line_number: int) -> int:
     """Return the position of the first byte of a line."""
     start = 0
     for _line in range(line_number - 1):
@@ -226,12 +226,12 @@ def _find_start_of_line(file_bytes: bytes, line_number: int) -> int:
 def _read_fields_line_by_line(file_bytes: bytes, layout: TextLayout) -> _TextFileRows:
     """Read the fields of each row, and skip blank lines and comments."""
     body = file_bytes[
-        _find_start_of_line(file_bytes, layout.first_line_number_after_header) :
+        _find_byte_offset_of_line(file_bytes, layout.first_line_number_after_header) :
     ].decode()
     first = layout.first_line_number_after_header
     found: list[list[str]] = []
     numbers: list[int] = []
-    if layout.delimiter == BLANK_DELIMITER:
+    if layout.delimiter == WHITESPACE_DELIMITER:
         for number, line in enumerate(body.split("\n"), first):
             if not is_line_without_data(line):
                 found.append(line.split())

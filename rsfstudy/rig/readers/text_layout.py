@@ -18,13 +18,13 @@ from rsfstudy.rig.readers.table_sources import append_units_to_headings
 from rsfstudy.rig.units import find_si_factor_and_exponents, parse_number
 
 #: Delimiter of files in which one or more blanks separate the columns.
-BLANK_DELIMITER = " "
+WHITESPACE_DELIMITER = " "
 #: First characters of comment lines.
 COMMENT_LINE_PREFIXES = ("#", "%")
 #: Maximum number of lines that are compared to detect the layout.
 _MAX_LINES_FOR_LAYOUT_DETECTION = 1000
 #: Maximum number of characters of a number in the compared lines.
-_MAX_NUMBER_LENGTH = 50
+_MAX_NUMBER_TEXT_LENGTH = 50
 _DELIMITER_DECLARATION_PATTERN = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 _DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?")
 _HORIZONTAL_RULE_PATTERN = re.compile(r"[-=_+|* \t]{3,}")
@@ -92,7 +92,7 @@ def split_line_into_fields(line: str, delimiter: str) -> list[str]:
     list of str
         Fields without surrounding blanks.
     """
-    if delimiter == BLANK_DELIMITER:
+    if delimiter == WHITESPACE_DELIMITER:
         return line.split()
     return [field.strip() for row in csv.reader([line], delimiter=delimiter) for field in row]
 
@@ -119,7 +119,7 @@ def detect_text_layout(lines: Sequence[str], decimal_separator: str) -> TextLayo
     """
     lines = lines[:_MAX_LINES_FOR_LAYOUT_DETECTION]
     skipped, stated = _find_declared_delimiter(lines)
-    candidates = [stated] if stated else ["\t", ";", BLANK_DELIMITER, ","]
+    candidates = [stated] if stated else ["\t", ";", WHITESPACE_DELIMITER, ","]
     for delimiter in candidates:
         if delimiter == decimal_separator:
             continue
@@ -161,7 +161,7 @@ def _is_row_mostly_numbers(fields: Sequence[str], decimal_separator: str) -> boo
 
 
 def _is_number(text: str) -> bool:
-    return len(text) < _MAX_NUMBER_LENGTH and parse_number(text) is not None
+    return len(text) < _MAX_NUMBER_TEXT_LENGTH and parse_number(text) is not None
 
 
 def _raise_if_decimal_commas(
@@ -234,13 +234,13 @@ def _split_line_into_headings(line: str, delimiter: str, column_count: int) -> l
 
 def _iterate_possible_header_splits(text: str, delimiter: str) -> Iterator[list[str]]:
     """Yield the headings of a header, split at each of several delimiters."""
-    if delimiter == BLANK_DELIMITER:
+    if delimiter == WHITESPACE_DELIMITER:
         yield from _iterate_header_splits_at_blanks(text)
     for mark in (delimiter, "\t", ";", ","):
-        if mark != BLANK_DELIMITER:
+        if mark != WHITESPACE_DELIMITER:
             yield split_line_into_fields(text, mark)
     yield re.split(r"\s{2,}", text)
-    if delimiter != BLANK_DELIMITER:
+    if delimiter != WHITESPACE_DELIMITER:
         yield from _iterate_header_splits_at_blanks(text)
 
 
@@ -288,7 +288,7 @@ def _detect_layout_without_numbers(
         if number >= first_line and text:
             delimiter = declared_delimiter or next(
                 (mark for mark in "\t;," if mark in text),
-                "," if {"(", "["} & {*text} else BLANK_DELIMITER,
+                "," if {"(", "["} & {*text} else WHITESPACE_DELIMITER,
             )
             return TextLayout(
                 delimiter, split_line_into_fields(text, delimiter), number + 1, number + 2

@@ -6,7 +6,7 @@ import numpy as np
 
 from rsfstudy.errors import DataError
 from rsfstudy.rig.columns import Column
-from rsfstudy.rig.readers.table_sources import SourceTable, TableSource, append_units_to_headings
+from rsfstudy.rig.readers.table_sources import LazyTable, TableSource, append_units_to_headings
 
 #: Layout of xlook files. The constants are the size of the file header in bytes, the size of each
 #: column header in bytes, and the number of column headers. The data of an xlook file follow the
@@ -36,7 +36,7 @@ def is_binary_file(source: TableSource) -> bool:
     return b"\0" in source.first_bytes_of_file[:_DATA_START_BYTE]
 
 
-def read_xlook_file(source: TableSource) -> SourceTable:
+def read_xlook_file(source: TableSource) -> LazyTable:
     """Read a binary xlook file.
 
     The file is big-endian. The file contains a file header, column headers of 84 bytes each, and
@@ -95,4 +95,4 @@ def read_xlook_file(source: TableSource) -> SourceTable:
         values = np.cumsum(values) if quantity_name == "time" else values
         return Column(values, "", index + 1)
 
-    return SourceTable(append_units_to_headings(names, units), str(path), load)
+    return LazyTable(append_units_to_headings(names, units), str(path), load)

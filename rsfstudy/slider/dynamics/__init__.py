@@ -49,15 +49,15 @@ class Dynamics(Part):
     """
 
     #: Name of the equations of motion between ruptures. The name appears in results.
-    regime: ClassVar[str]
-    received_quantities = frozenset(QUANTITIES_A_PART_MAY_NEED)
+    regime_name: ClassVar[str]
+    received_quantity_names = frozenset(QUANTITIES_A_PART_MAY_NEED)
     build_slip_rate_functions: ClassVar[NumericFunction]
     build_rupture_rate_function: ClassVar[NumericFunction | None] = None
     #: True if slip may reverse in scenes with the regularised friction law.
     allows_reversed_slip: ClassVar[bool] = False
 
     @classmethod
-    def required_functions(cls) -> tuple[str, ...]:
+    def list_required_function_names(cls) -> tuple[str, ...]:
         """Return the names of the functions that the dynamics must define.
 
         Returns
@@ -97,7 +97,7 @@ class Dynamics(Part):
         """
         return 0.0
 
-    def slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
+    def compute_slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
         r"""Compute the slip rate norm, which measures the effect of inertia.
 
         Parameters

@@ -127,7 +127,7 @@ def build_slow_manifold_slip_rate_functions(
         The argument for the quasi-static motion is the tuple returned by ``quasi_static_values``.
         """
         x, growing, slope, weight, _shift = alone
-        first = compute_clamped_inertial_stress(weight, growing, p)
+        first = compute_inertial_stress_limited_to_a(weight, growing, p)
         if weight <= NEGLIGIBLE_SECOND_ORDER_WEIGHT:
             return first
         trails = slope * first / p[A]
@@ -141,9 +141,11 @@ def build_slow_manifold_slip_rate_functions(
             spring_stress + DIFFERENCE_STEP * loading, ahead(psis, changes, DIFFERENCE_STEP), p
         )
         trails_ahead = (
-            slope_ahead * compute_clamped_inertial_stress(weight_ahead, growing_ahead, p) / p[A]
+            slope_ahead
+            * compute_inertial_stress_limited_to_a(weight_ahead, growing_ahead, p)
+            / p[A]
         )
-        return compute_clamped_inertial_stress(
+        return compute_inertial_stress_limited_to_a(
             compute_inertia_weight(slowed, slower, p),
             growing - (trails_ahead - trails) / DIFFERENCE_STEP,
             p,
@@ -198,7 +200,7 @@ def build_slow_manifold_slip_rate_functions(
     return balance, growth
 
 
-def compute_clamped_inertial_stress(
+def compute_inertial_stress_limited_to_a(
     inertia_weight: float, log_slip_rate_derivative: float, p: FloatTuple
 ) -> float:
     r"""Compute the bounded stress that accelerates the mass.
@@ -296,12 +298,12 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Numeri
             log_norm = math.copysign(LOG_SLIP_RATE_UPPER_LIMIT, log_norm)
         norm = math.exp(log_norm)
         value, slope, shift, _shift_slope = strength(g, others, p)
-        faster = clamp_rate_per_inertial_time((spring_stress - g) / (stiffness * norm))
+        faster = limit_rate_per_inertial_time((spring_stress - g) / (stiffness * norm))
         changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)
         return (
-            clamp_rate_per_inertial_time(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
+            limit_rate_per_inertial_time(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
             faster,
-            clamp_rate_per_inertial_time(
+            limit_rate_per_inertial_time(
                 (a * faster + contribution(changes, g, others, p)) / slope
             ),
             *changes[1:],
@@ -310,7 +312,7 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Numeri
     return rates
 
 
-def clamp_rate_per_inertial_time(rate: float) -> float:
+def limit_rate_per_inertial_time(rate: float) -> float:
     """Limit the magnitude of a rate to ``MAX_RATE_OF_UNKNOWNS_PER_INERTIAL_TIME``.
 
     Parameters
@@ -355,8 +357,8 @@ class Inertia(Dynamics):
     inertia: bool = flag(False, "1 if the slider has mass, otherwise 0")
 
     name = "inertia"
-    selected_by = "inertia"
-    regime = "slow_manifold"
+    selecting_field_name = "inertia"
+    regime_name = "slow_manifold"
     build_slip_rate_functions = staticmethod(build_slow_manifold_slip_rate_functions)
     build_rupture_rate_function = staticmethod(build_rupture_rate_function)
 
@@ -372,7 +374,7 @@ class Inertia(Dynamics):
         """
         return scene.inertial_time, math.log(scene.inertial_time)
 
-    def slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
+    def compute_slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
         """Compute the slip rate norm, which measures the effect of inertia.
 
         See ``Dynamics.slip_rate_norm``.
@@ -380,10 +382,10 @@ class Inertia(Dynamics):
         return scene.inertial_time * math.exp(log_slip_rate)
 
     @classmethod
-    def rejection_error(cls, name: str, value: Any) -> InvalidValue:
+    def build_field_rejection_error(cls, field_name: str, value: Any) -> InvalidValue:
         """Return the error for a field that belongs to another dynamics class.
 
         See ``Part.rejection_error``.
         """
         rule = "approximates inertia, so it cannot be combined with inertia=True"
-        return InvalidValue(name, value, rule, remedy="Omit one of the two.")
+        return InvalidValue(field_name, value, rule, remedy="Omit one of the two.")

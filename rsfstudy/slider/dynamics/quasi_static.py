@@ -48,6 +48,6 @@ class QuasiStatic(Dynamics):
     """Quasi-static dynamics, without inertia or radiation damping."""
 
     name = "quasi_static"
-    regime = "quasi_static"
+    regime_name = "quasi_static"
     allows_reversed_slip = True
     build_slip_rate_functions = staticmethod(build_quasi_static_slip_rate_functions)

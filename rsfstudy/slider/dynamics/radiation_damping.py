@@ -152,8 +152,8 @@ class RadiationDamping(Dynamics):
     )
 
     name = "radiation_damping"
-    selected_by = "radiation_damping"
-    regime = "quasi_dynamic"
+    selecting_field_name = "radiation_damping"
+    regime_name = "quasi_dynamic"
     build_slip_rate_functions = staticmethod(build_damped_slip_rate_functions)
 
     @property

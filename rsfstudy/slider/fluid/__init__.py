@@ -57,9 +57,9 @@ class Fluid(Part):
     ['porosity', 'pore_pressure']
     """
 
-    derived_properties = ("highest_pressure",)
-    defining_methods = frozenset({"auxiliary_rates", "parameter_values"})
-    received_quantities = frozenset({SLIP_RATE, PORE_PRESSURE})
+    members_derived_from_equations = ("highest_pressure",)
+    members_defining_equations = frozenset({"auxiliary_rates", "parameter_values"})
+    received_quantity_names = frozenset({SLIP_RATE, PORE_PRESSURE})
 
     @property
     def pressurisation_factor(self) -> float:

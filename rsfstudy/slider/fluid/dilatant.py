@@ -123,10 +123,10 @@ def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
     loading, remedy = scene.parts.loading, "Omit porosity_length."
     if fluid.auxiliary_rates is not compute_rates_with_porosity_length:
         rule = f"has no effect on the rates of the fluid {fluid.name!r}"
-        raise fluid.field_error("porosity_length", rule, remedy)
+        raise fluid.build_field_error("porosity_length", rule, remedy)
     if loading.unknowns:
         rule = f"must be 1 if the loading {loading.name!r} changes the pore pressure"
-        raise fluid.field_error("porosity_length", rule, remedy)
+        raise fluid.build_field_error("porosity_length", rule, remedy)
 
 
 def compute_steady_porosity_and_pressure(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
@@ -205,7 +205,7 @@ class DilatantFluid(Fluid):
         check_porosity_length(self, scene)
         if lacks_critical_stiffness(scene):
             rule = f"gives no critical stiffness with dilatancy = {self.dilatancy:g}"
-            raise self.field_error(
+            raise self.build_field_error(
                 "drainage", rule, "Pass stiffness instead of stiffness_ratio, or increase drainage."
             )
 

@@ -23,15 +23,17 @@ class DrainedFluid(Fluid):
     """
 
     name = "drained"
-    rejection_hint = "when the fault is drained", "set fluid='dilatant'"
+    rejection_condition_and_remedy = "when the fault is drained", "set fluid='dilatant'"
 
     @classmethod
-    def rejection_error(cls, name: str, value: Any) -> InvalidValue:
+    def build_field_rejection_error(cls, field_name: str, value: Any) -> InvalidValue:
         """Return the error for a field that belongs to another fluid.
 
         See ``Part.rejection_error``.
         """
-        if name != "pressurisation":
-            return super().rejection_error(name, value)
+        if field_name != "pressurisation":
+            return super().build_field_rejection_error(field_name, value)
         remedy = "Omit pressurisation, or set fluid='thermal'."
-        return InvalidValue(name, value, "does not apply when the fault is drained", remedy=remedy)
+        return InvalidValue(
+            field_name, value, "does not apply when the fault is drained", remedy=remedy
+        )

@@ -193,6 +193,6 @@ class ThermalFluid(Fluid):
             check_porosity_length(self, scene)
         if lacks_critical_stiffness(scene):
             rule = "gives no critical stiffness with thermal pressurisation"
-            raise self.field_error(
+            raise self.build_field_error(
                 "drainage", rule, "Pass stiffness instead of stiffness_ratio, or increase drainage."
             )

@@ -155,9 +155,9 @@ class LawBase(Part):
         False, "1 if slip can reverse with the sign of the shear stress, otherwise 0"
     )
 
-    derived_properties = ("has_closed_orbits", "scale_free", "relaxation")
-    defining_methods = frozenset({"evolution", "evolutions"})
-    received_quantities = QUANTITIES_RECEIVED_BY_LAWS
+    members_derived_from_equations = ("has_closed_orbits", "scale_free", "relaxation")
+    members_defining_equations = frozenset({"evolution", "evolutions"})
+    received_quantity_names = QUANTITIES_RECEIVED_BY_LAWS
     #: Number of states of the law.
     state_count: ClassVar[int] = 1
     #: True if every orbit around steady sliding is closed at the critical stiffness, provided that
@@ -168,7 +168,7 @@ class LawBase(Part):
     #: True if Theta = b ln(theta/theta_*), so that theta can be computed from the state variable.
     has_logarithmic_state: ClassVar[bool] = True
     #: True if the law contains no characteristic slip rate, so the choice of V_* is arbitrary.
-    scale_free: ClassVar[bool] = False
+    lacks_characteristic_slip_rate: ClassVar[bool] = False
     #: Function ``relaxation(rate, slip)``, the closed-form solution at constant normal stress and
     #: constant slip rate. The argument ``rate`` is ln(V/V_*), and ``slip`` is the slip in D_c. The
     #: function returns the difference between the friction coefficient and its steady value,
@@ -183,7 +183,7 @@ class LawBase(Part):
     state_effect: ClassVar[NumericFunction | None] = None
 
     @classmethod
-    def required_functions(cls) -> tuple[str, ...]:
+    def list_required_function_names(cls) -> tuple[str, ...]:
         """Return the names of the functions that the law must define.
 
         Returns
@@ -220,7 +220,7 @@ class LawBase(Part):
         return ()
 
     @property
-    def state_change_over_a(self) -> float:
+    def state_change_per_log_rate_over_a(self) -> float:
         """Magnitude of the steady-state change per unit change of ln V, divided by a.
 
         The value is always positive.
@@ -273,7 +273,7 @@ class LawBase(Part):
                 "Omit stress_dependence. If you wrote the normal stress class, and the ratio of "
                 "both stresses is constant, define the property coupling in the class."
             )
-            raise self.field_error("stress_dependence", rule, remedy)
+            raise self.build_field_error("stress_dependence", rule, remedy)
         pressed = source.unknowns and not loading.has_load_point_unknown
         if scene.parts.temperature.unknowns:
             pressed, source = True, scene.parts.temperature
@@ -285,7 +285,7 @@ class LawBase(Part):
                 f"cannot be combined with {one_way.name!r}, because the equations of "
                 f"{one_way.name!r} contain ln V and therefore require forward slip"
             )
-            raise self.field_error("regularised", rule, "Omit one of the two.")
+            raise self.build_field_error("regularised", rule, "Omit one of the two.")
 
 
 @add_former_member_names
@@ -365,7 +365,7 @@ class Law(LawBase):
         return (scene.a * (self.b_over_a or B_OVER_A_USED_INSTEAD_OF_ZERO),)
 
     @property
-    def min_weakening_b_over_a(self) -> float:
+    def min_b_over_a_for_weakening(self) -> float:
         """Smallest b/a for which steady friction decreases with slip rate.
 
         The change in friction with slip rate is evaluated in steady sliding at :math:`V_*`.
@@ -396,23 +396,23 @@ class Law(LawBase):
                 "alpha/b and c/b"
             )
             remedy = "Omit alpha and stress_dependence, or pass another value of b_over_a."
-            raise self.field_error("b_over_a", rule, remedy)
+            raise self.build_field_error("b_over_a", rule, remedy)
         if not self.b_over_a and scene.parts.slider.initial_state:
             rule = "has no effect, because b_over_a is 0"
             raise scene.parts.slider.field_error("initial_state", rule, "Omit initial_state.")
         if 0.0 < abs(self.b_over_a) < MIN_NONZERO_B_OVER_A:
-            raise self.field_error(
+            raise self.build_field_error(
                 "b_over_a",
                 f"must be 0 or have an absolute value of at least {MIN_NONZERO_B_OVER_A:g}",
                 "Pass 0.",
             )
-        least = self.min_weakening_b_over_a
+        least = self.min_b_over_a_for_weakening
         if self.b_over_a <= least and lacks_critical_stiffness(scene):
             rule = (
                 f"must exceed {least:.6g}, because only rate-weakening friction has a critical "
                 "stiffness"
             )
-            raise self.field_error("b_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)
+            raise self.build_field_error("b_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)
 
 
 #: Value of b/a that is used instead of zero, because equations divide by b. The value is so small

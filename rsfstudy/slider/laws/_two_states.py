@@ -19,7 +19,9 @@ from rsfstudy.slider.scene_view import SceneView
 FIRST_B, SECOND_B, FIRST_SHARE, SECOND_SHARE, LENGTH_QUOTIENT = range(LAW, LAW + 5)
 
 
-def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTuple) -> FloatTuple:
+def compute_steady_states(
+    log_slip_rate: float, stress_induced_state_shift: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute both state variables in steady sliding.
 
     See ``LawBase`` for the arguments.
@@ -33,8 +35,8 @@ def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTupl
         \Psi_i = c_i \, \mathrm{shift} - b_i \ln\frac{V}{V_*}.
     """
     return (
-        p[FIRST_SHARE] * state_shift - p[FIRST_B] * log_slip_rate,
-        p[SECOND_SHARE] * state_shift - p[SECOND_B] * log_slip_rate,
+        p[FIRST_SHARE] * stress_induced_state_shift - p[FIRST_B] * log_slip_rate,
+        p[SECOND_SHARE] * stress_induced_state_shift - p[SECOND_B] * log_slip_rate,
     )
 
 
@@ -100,7 +102,7 @@ class TwoStateLaw(LawBase):
         return self.b1_over_a + self.b2_over_a
 
     @property
-    def state_change_over_a(self) -> float:
+    def state_change_per_log_rate_over_a(self) -> float:
         """Sum of the magnitudes of both evolution effects, divided by a."""
         return abs(self.b1_over_a) + abs(self.b2_over_a)
 
@@ -111,26 +113,26 @@ class TwoStateLaw(LawBase):
         parameter b and its share of the effect of stress. The last value is :math:`L_1/L_2`, the
         inverse of ``length_ratio``.
         """
-        both, size = (self.b1_over_a, self.b2_over_a), self.state_change_over_a
+        both, size = (self.b1_over_a, self.b2_over_a), self.state_change_per_log_rate_over_a
         # If b is zero for both states, the shares are undefined. The method ``check`` rejects this
         # case.
         shares = (abs(b) / size if size else 0.5 for b in both)
         return (*(scene.a * b for b in both), *shares, 1.0 / self.length_ratio)
 
     @classmethod
-    def rejection_error(cls, name: str, value: object) -> InvalidValue:
+    def build_field_rejection_error(cls, field_name: str, value: object) -> InvalidValue:
         """Return the error for a field that belongs to another law.
 
         See ``Part.rejection_error``. The error message for ``b_over_a`` names the two fields that
         replace ``b_over_a``.
         """
-        if name == "b_over_a":
+        if field_name == "b_over_a":
             rule = (
                 f"cannot be set for law={cls.name!r}, because b_over_a is the sum of b1_over_a and "
                 "b2_over_a"
             )
-            return InvalidValue(name, value, rule, remedy="Pass b1_over_a and b2_over_a.")
-        return super().rejection_error(name, value)
+            return InvalidValue(field_name, value, rule, remedy="Pass b1_over_a and b2_over_a.")
+        return super().build_field_rejection_error(field_name, value)
 
     def check(self, scene: SceneView) -> None:
         """Check the evolution effects and the critical stiffness.
@@ -139,12 +141,12 @@ class TwoStateLaw(LawBase):
         ``stiffness_ratio``.
         """
         super().check(scene)
-        if not self.state_change_over_a:
+        if not self.state_change_per_log_rate_over_a:
             rule = (
                 "must not be 0 if b1_over_a is 0, because otherwise no state variable "
                 "affects friction"
             )
-            raise self.field_error(
+            raise self.build_field_error(
                 "b2_over_a", rule, "Pass a nonzero value for b1_over_a or b2_over_a."
             )
         if lacks_critical_stiffness(scene):
@@ -152,4 +154,4 @@ class TwoStateLaw(LawBase):
                 f"gives no critical stiffness with b1_over_a = {self.b1_over_a:g} and "
                 f"length_ratio = {self.length_ratio:g}"
             )
-            raise self.field_error("b2_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)
+            raise self.build_field_error("b2_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)

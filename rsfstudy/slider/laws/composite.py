@@ -54,12 +54,14 @@ def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: Floa
     ahead = state / b + log_slip_rate + p[LAW + 2]
     return b * (
         compute_healing_reduction_factor(log_slip_rate, p[LAW + 1])
-        * math.exp(clamp_exponent(-ahead))
+        * math.exp(limit_exponent_to_avoid_overflow(-ahead))
         - ahead
     )
 
 
-def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTuple) -> FloatTuple:
+def compute_steady_states(
+    log_slip_rate: float, stress_induced_state_shift: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the state variable in steady sliding.
 
     See ``LawBase`` for the arguments.
@@ -73,7 +75,7 @@ def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTupl
         u \, e^u = e^{-V/V_c}.
     """
     ahead = compute_lambert_w(compute_healing_reduction_factor(log_slip_rate, p[LAW + 1]))
-    return (state_shift + p[LAW] * (ahead - p[LAW + 2] - log_slip_rate),)
+    return (stress_induced_state_shift + p[LAW] * (ahead - p[LAW + 2] - log_slip_rate),)
 
 
 def compute_healing_reduction_factor(log_slip_rate: float, log_cutoff_velocity: float) -> float:
@@ -91,10 +93,12 @@ def compute_healing_reduction_factor(log_slip_rate: float, log_cutoff_velocity: 
     float
         Factor :math:`\exp(-V/V_c)`.
     """
-    return math.exp(-math.exp(clamp_exponent(log_slip_rate - log_cutoff_velocity)))
+    return math.exp(
+        -math.exp(limit_exponent_to_avoid_overflow(log_slip_rate - log_cutoff_velocity))
+    )
 
 
-def clamp_exponent(exponent: float) -> float:
+def limit_exponent_to_avoid_overflow(exponent: float) -> float:
     """Limit an exponent to ``MAX_EXPONENT_IN_STATE_EVOLUTION``.
 
     Larger exponents occur only in trial steps of the integrator.
@@ -151,13 +155,13 @@ class CompositeLaw(Law):
     steady_states = staticmethod(compute_steady_states)
 
     @property
-    def min_weakening_b_over_a(self) -> float:
+    def min_b_over_a_for_weakening(self) -> float:
         r"""Smallest b/a for which steady friction decreases with slip rate.
 
         At :math:`V_*`, the steady friction coefficient decreases with :math:`\ln V` at the rate
         :math:`b - a + b \, u_* V_*/[(1 + u_*) V_c]`.
         """
-        ahead = self._compute_offset_at_reference_rate()
+        ahead = self._compute_lambert_w_at_reference_rate()
         return 1.0 / (1.0 + ahead / ((1.0 + ahead) * self.cutoff_velocity_ratio))
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
@@ -170,10 +174,10 @@ class CompositeLaw(Law):
         return (
             *super().parameter_values(scene),
             logarithm,
-            self._compute_offset_at_reference_rate(),
+            self._compute_lambert_w_at_reference_rate(),
         )
 
-    def _compute_offset_at_reference_rate(self) -> float:
+    def _compute_lambert_w_at_reference_rate(self) -> float:
         return compute_lambert_w(
             compute_healing_reduction_factor(0.0, math.log(self.cutoff_velocity_ratio))
         )

@@ -52,7 +52,9 @@ def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: Floa
     return b * fast_expm1(min(behind, MAX_EXPONENT_IN_STATE_EVOLUTION))
 
 
-def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTuple) -> FloatTuple:
+def compute_steady_states(
+    log_slip_rate: float, stress_induced_state_shift: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the state variable in steady sliding.
 
     See ``LawBase`` for the arguments.
@@ -66,7 +68,8 @@ def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTupl
         \Theta_{\mathrm{ss}} = b \ln\frac{1 + V_c/V}{1 + V_c/V_*}.
     """
     return (
-        state_shift + p[LAW] * compute_steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),
+        stress_induced_state_shift
+        + p[LAW] * compute_steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),
     )
 
 
@@ -123,7 +126,7 @@ class CutOffLaw(Law):
     has_logarithmic_state = False  # The state is a logarithm of 1 + theta V_c/D_c.
 
     @property
-    def min_weakening_b_over_a(self) -> float:
+    def min_b_over_a_for_weakening(self) -> float:
         r"""Smallest b/a for which steady friction decreases with slip rate.
 
         At :math:`V_*`, the steady friction coefficient decreases with :math:`\ln V` at the rate
@@ -137,7 +140,7 @@ class CutOffLaw(Law):
         See ``Part.parameter_values``. The velocity fractions are :math:`V_c/(V_c + V_*)` and
         :math:`V_*/(V_c + V_*)`.
         """
-        return (*super().parameter_values(scene), *self._compute_velocity_fractions())
+        return (*super().parameter_values(scene), *self._compute_cutoff_and_reference_fractions())
 
     def relaxation(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.
@@ -162,10 +165,12 @@ class CutOffLaw(Law):
 
             \ln\left[1 + \left(\frac{1 + V_c/V_*}{1 + V_c/V} - 1\right) e^{-\delta/D_c}\right].
         """
-        ahead = -compute_steady_state_over_b(log_slip_rate, *self._compute_velocity_fractions())
+        ahead = -compute_steady_state_over_b(
+            log_slip_rate, *self._compute_cutoff_and_reference_fractions()
+        )
         return math.log(-math.expm1(-slip) + math.exp(ahead - slip))
 
-    def _compute_velocity_fractions(self) -> FloatTuple:
+    def _compute_cutoff_and_reference_fractions(self) -> FloatTuple:
         return 1.0 / (1.0 + 1.0 / self.cutoff_velocity_ratio), 1.0 / (
             1.0 + self.cutoff_velocity_ratio
         )

@@ -64,7 +64,7 @@ class SlipToSlownessLaw(Law):
 
     name = "family"
     evolution = staticmethod(compute_state_evolution_per_slip)
-    scale_free = True
+    lacks_characteristic_slip_rate = True
     has_closed_orbits = True  # The derivative dh/du = -(1 + eps h) is linear in h.
 
     def relaxation(self, log_slip_rate: float, slip: float) -> float:

@@ -15,7 +15,7 @@ from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def compute_unshifted_steady_state(log_slip_rate: float, p: FloatTuple) -> float:
+def compute_steady_state_without_shift(log_slip_rate: float, p: FloatTuple) -> float:
     r"""Compute the state variable in steady sliding.
 
     Parameters
@@ -70,10 +70,12 @@ def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: Floa
     float
         Rate :math:`D_c \, d\Theta/d\delta = -(\Theta - \Theta_{\mathrm{ss}})`.
     """
-    return compute_unshifted_steady_state(log_slip_rate, p) - state
+    return compute_steady_state_without_shift(log_slip_rate, p) - state
 
 
-def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTuple) -> FloatTuple:
+def compute_steady_states(
+    log_slip_rate: float, stress_induced_state_shift: float, p: FloatTuple
+) -> FloatTuple:
     r"""Compute the state variable in steady sliding, including the shift.
 
     Parameters
@@ -90,7 +92,7 @@ def compute_steady_states(log_slip_rate: float, state_shift: float, p: FloatTupl
     tuple of float
         State :math:`\Psi`.
     """
-    return (state_shift + compute_unshifted_steady_state(log_slip_rate, p),)
+    return (stress_induced_state_shift + compute_steady_state_without_shift(log_slip_rate, p),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,7 +177,7 @@ class FlashHeatingLaw(Law):
                 f"must be less than mu_star = {scene.mu_star:g}, because flash heating "
                 "decreases friction"
             )
-            raise self.field_error(
+            raise self.build_field_error(
                 "weakened_friction", rule, "Decrease weakened_friction, or increase mu_star."
             )
 

@@ -80,4 +80,4 @@ class PerrinRiceZhengLaw(Law):
     name = "perrin_rice_zheng"
     evolution = staticmethod(compute_state_evolution_per_slip)
     relaxation = staticmethod(compute_relaxation_after_velocity_step)
-    scale_free = True
+    lacks_characteristic_slip_rate = True

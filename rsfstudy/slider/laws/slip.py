@@ -61,5 +61,5 @@ class SlipLaw(Law):
     name = "slip"
     evolution = staticmethod(compute_state_evolution_per_slip)
     relaxation = staticmethod(compute_relaxation_after_velocity_step)
-    scale_free = True
+    lacks_characteristic_slip_rate = True
     has_closed_orbits = True  # See Gu et al. (1984).

@@ -74,5 +74,5 @@ class SlownessLaw(Law):
     name = "slowness"
     evolution = staticmethod(compute_state_evolution_per_slip)
     relaxation = staticmethod(compute_relaxation_after_velocity_step)
-    scale_free = True
+    lacks_characteristic_slip_rate = True
     has_closed_orbits = True  # See Ranjith and Rice (1999).

@@ -18,7 +18,7 @@ from rsfstudy.slider.parts import FloatTuple
 def compute_state_evolutions(
     log_slip_rate: float,
     states: FloatTuple,
-    state_shift: float,
+    stress_induced_state_shift: float,
     slip_per_independent_variable: float,
     p: FloatTuple,
 ) -> FloatTuple:
@@ -34,8 +34,8 @@ def compute_state_evolutions(
 
         L_i \frac{d\Theta_i}{d\delta} = -\left(\Theta_i + b_i \ln\frac{V}{V_*}\right).
     """
-    first = states[0] - p[FIRST_SHARE] * state_shift + p[FIRST_B] * log_slip_rate
-    second = states[1] - p[SECOND_SHARE] * state_shift + p[SECOND_B] * log_slip_rate
+    first = states[0] - p[FIRST_SHARE] * stress_induced_state_shift + p[FIRST_B] * log_slip_rate
+    second = states[1] - p[SECOND_SHARE] * stress_induced_state_shift + p[SECOND_B] * log_slip_rate
     return -slip_per_independent_variable * first, -slip_per_independent_variable * p[
         LENGTH_QUOTIENT
     ] * second

@@ -21,7 +21,7 @@ from rsfstudy.slider.scene_view import SceneView
 def compute_state_evolutions(
     log_slip_rate: float,
     states: FloatTuple,
-    state_shift: float,
+    stress_induced_state_shift: float,
     slip_per_independent_variable: float,
     p: FloatTuple,
 ) -> FloatTuple:
@@ -46,8 +46,10 @@ def compute_state_evolutions(
           = b_i \left\{\exp\left[-\left(\frac{\Theta_i}{b_i}
           + \ln\frac{V}{V_*}\right)\right] - 1\right\}.
     """
-    first = (states[0] - p[FIRST_SHARE] * state_shift) / p[FIRST_B] + log_slip_rate
-    second = (states[1] - p[SECOND_SHARE] * state_shift) / p[SECOND_B] + log_slip_rate
+    first = (states[0] - p[FIRST_SHARE] * stress_induced_state_shift) / p[FIRST_B] + log_slip_rate
+    second = (states[1] - p[SECOND_SHARE] * stress_induced_state_shift) / p[
+        SECOND_B
+    ] + log_slip_rate
     return (
         slip_per_independent_variable
         * p[FIRST_B]

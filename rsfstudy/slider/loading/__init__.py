@@ -116,7 +116,7 @@ class Loading(Part):
     #: mean motion causes the shear stress. The shear stress equals the last unknown minus the third
     #: element of ``parameter_values``.
     has_load_point_unknown: ClassVar[bool] = False
-    received_quantities = frozenset({SLIP_RATE})
+    received_quantity_names = frozenset({SLIP_RATE})
     #: True if the loading decreases the effective normal stress by an increase in pore pressure. In
     #: a scene whose fluid has unknowns, the loading increases the pore pressure around the fault.
     of_pressure: ClassVar[bool] = True
@@ -154,7 +154,7 @@ class Loading(Part):
         """
         if len(self.segments) > 1:
             self._check_segment_durations()
-        fluid, name = scene.parts.fluid, self.selected_by
+        fluid, name = scene.parts.fluid, self.selecting_field_name
         if self.unknowns and fluid.unknowns and not self.of_pressure:
             rule = f"does not apply to fluid={fluid.name!r}"
             rule += ", because the pore pressure already changes the effective normal stress"
@@ -213,7 +213,7 @@ class Loading(Part):
         return history[segment_index]
 
     @property
-    def reported_segment_count(self) -> int:
+    def reported_segment_start_count(self) -> int:
         """Number of segment starts that are reported as events of a motion.
 
         Only the starts of the last segments of the loading are reported.
@@ -263,7 +263,7 @@ class Loading(Part):
         )
 
     @classmethod
-    def rejection_error(cls, name: str, value: Any) -> InvalidValue:
+    def build_field_rejection_error(cls, field_name: str, value: Any) -> InvalidValue:
         """Return the error for a field that belongs to another loading.
 
         Parameters
@@ -281,13 +281,17 @@ class Loading(Part):
         owners = (
             p
             for p in BUILT_IN_LOADING_CLASS_BY_NAME.values()
-            if str(name) in p.__dataclass_fields__
+            if str(field_name) in p.__dataclass_fields__
         )
-        wanted = " or ".join(p.selected_by for p in owners if p.selected_by not in ("", name))
-        remedy = f"Omit {name}, or also set {wanted}." if wanted else f"Omit {name}."
+        wanted = " or ".join(
+            p.selecting_field_name for p in owners if p.selecting_field_name not in ("", field_name)
+        )
+        remedy = f"Omit {field_name}, or also set {wanted}." if wanted else f"Omit {field_name}."
         # The name of a protocol is an attribute of the instance, not of the class.
         of = getattr(cls, "name", cls.__name__)
-        return InvalidValue(name, value, f"does not apply to the loading {of!r}", remedy=remedy)
+        return InvalidValue(
+            field_name, value, f"does not apply to the loading {of!r}", remedy=remedy
+        )
 
 
 def declare_load_velocity_field() -> Any:

@@ -134,7 +134,7 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
                 "inertia cannot be neglected"
             )
             remedy = "Set inertia=True, or use a longer period."
-            raise self.field_error("oscillation_period", rule, remedy)
+            raise self.build_field_error("oscillation_period", rule, remedy)
 
     @property
     def initial_phase(self) -> float:

@@ -54,7 +54,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
     )
 
     name = "oscillation"
-    selected_by = "oscillation_amplitude"
+    selecting_field_name = "oscillation_amplitude"
     unknowns = (
         Quantity(
             "oscillation_ahead",
@@ -73,7 +73,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
         """
         if self.oscillation_amplitude >= 1.0:
             remedy = "The normal stress must stay positive during the oscillation."
-            raise self.field_error("oscillation_amplitude", "must be less than 1", remedy)
+            raise self.build_field_error("oscillation_amplitude", "must be less than 1", remedy)
         super().check(scene)
 
     def initial_unknowns(self, scene: SceneView) -> FloatTuple:

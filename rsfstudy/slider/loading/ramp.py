@@ -97,7 +97,7 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
     load_velocity_ratio: float | None = declare_load_velocity_field()
 
     name = "ramp"
-    selected_by = "normal_stress_ramp"
+    selecting_field_name = "normal_stress_ramp"
     unknowns = (
         Quantity("ramp_left", "$P$", "1", "remaining change of imposed normal stress", "sigma_*"),
     )

@@ -48,7 +48,7 @@ class SlideHoldSlide(LoadingWithFinalLoadVelocity):
     load_velocity_ratio: float | None = declare_load_velocity_field()
 
     name = "slide_hold_slide"
-    selected_by = "hold_time"
+    selecting_field_name = "hold_time"
 
     @property
     def segments(self) -> tuple[Segment, ...]:

@@ -54,7 +54,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
     )
 
     name = "velocity_oscillation"
-    selected_by = "velocity_oscillation"
+    selecting_field_name = "velocity_oscillation"
     has_load_point_unknown = True
     unknowns = (
         Quantity(
@@ -79,10 +79,10 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
                 "is defined for forward slip only"
             )
             remedy = "Set regularised=True, which permits reversed slip."
-            raise self.field_error("velocity_oscillation", rule, remedy)
+            raise self.build_field_error("velocity_oscillation", rule, remedy)
         if self.load_velocity == 0.0:
             rule = "must be greater than 0, because velocity_oscillation is relative to it"
-            raise self.field_error("load_velocity_ratio", rule)
+            raise self.build_field_error("load_velocity_ratio", rule)
         super().check(scene)
 
     def initial_unknowns(self, scene: SceneView) -> FloatTuple:

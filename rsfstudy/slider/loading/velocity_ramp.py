@@ -64,7 +64,7 @@ class VelocityRamp(Loading):
     )
 
     name = "velocity_ramp"
-    selected_by = "velocity_ramp"
+    selecting_field_name = "velocity_ramp"
 
     @property
     def segments(self) -> tuple[Segment, ...]:

@@ -12,4 +12,7 @@ class NoNoise(Noise):
     """Loading without noise."""
 
     name = "none"
-    rejection_hint = "without noise", "set loading_noise='white' or loading_noise='correlated'"
+    rejection_condition_and_remedy = (
+        "without noise",
+        "set loading_noise='white' or loading_noise='correlated'",
+    )

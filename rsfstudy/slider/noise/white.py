@@ -121,7 +121,7 @@ class WhiteNoise(Noise):
         if self.unknowns and fluid.unknowns:
             rule = f"does not apply to fluid={fluid.name!r}"
             rule += ", because the pore pressure already changes the effective normal stress"
-            raise self.field_error("normal_stress_noise", rule, "Omit one of the two.")
+            raise self.build_field_error("normal_stress_noise", rule, "Omit one of the two.")
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the initial rate of change of the normal stress.

@@ -37,9 +37,13 @@ class NormalStress(Part):
     1.0
     """
 
-    derived_properties = ("depends_on_shear_stress", "coupling", "min_frictional_stress")
-    defining_methods = frozenset({"normal_stress", "state_effect", "parameter_values"})
-    received_quantities = frozenset({SHEAR_STRESS})
+    members_derived_from_equations = (
+        "depends_on_shear_stress",
+        "coupling",
+        "min_frictional_stress",
+    )
+    members_defining_equations = frozenset({"normal_stress", "state_effect", "parameter_values"})
+    received_quantity_names = frozenset({SHEAR_STRESS})
     normal_stress: ClassVar[NumericFunction | None] = None
 
     @property

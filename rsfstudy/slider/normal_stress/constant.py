@@ -23,7 +23,10 @@ class ConstantNormalStress(NormalStress):
     """
 
     name = "constant"
-    rejection_hint = "when normal stress is constant", "set normal_stress='variable'"
+    rejection_condition_and_remedy = (
+        "when normal stress is constant",
+        "set normal_stress='variable'",
+    )
     coupling = (0.0, 0.0)
 
     def check(self, scene: SceneView) -> None:

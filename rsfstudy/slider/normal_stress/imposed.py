@@ -44,7 +44,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
     """
 
     name = "imposed"
-    rejection_hint = (
+    rejection_condition_and_remedy = (
         "when normal stress does not depend on shear stress",
         "set normal_stress='variable'",
     )

@@ -127,11 +127,11 @@ class VariableNormalStress(NormalStressWithStateEffect):
         """
         if self.phi >= 90.0:
             remedy = "For constant normal stress (90 degrees), set normal_stress='constant'."
-            raise self.field_error("phi", "must lie between 0 and 90 degrees", remedy)
+            raise self.build_field_error("phi", "must lie between 0 and 90 degrees", remedy)
         lowest = math.degrees(math.atan(scene.mu_star))
         if self.phi <= lowest:
             rule = (
                 f"must exceed atan(mu_star) = {lowest:.6g} degrees, because the principal "
                 "stress sigma_3 would otherwise be negative"
             )
-            raise self.field_error("phi", rule, "Increase phi, or decrease mu_star.")
+            raise self.build_field_error("phi", rule, "Increase phi, or decrease mu_star.")

@@ -61,13 +61,13 @@ class Temperature(Part):
     'isothermal'
     """
 
-    received_quantities = frozenset(
+    received_quantity_names = frozenset(
         {SLIP_RATE, FRICTION_COEFFICIENT, EFFECTIVE_NORMAL_STRESS, SHEAR_STRESS}
     )
     temperature_rate: ClassVar[NumericFunction | None] = None
 
     @classmethod
-    def required_functions(cls) -> tuple[str, ...]:
+    def list_required_function_names(cls) -> tuple[str, ...]:
         """Return the names of the functions that the subclass must define.
 
         Returns
@@ -79,14 +79,16 @@ class Temperature(Part):
         return ("temperature_rate",) if cls.unknowns else ()
 
     @property
-    def activation(self) -> tuple[float, float]:
+    def activation_terms(self) -> tuple[float, float]:
         """Activation terms of the direct effect and of the evolution effect.
 
         In the base class, friction does not depend on temperature, and both terms are zero.
         """
         return 0.0, 0.0
 
-    def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
+    def compute_temperature_rise_bounds(
+        self, scene: SceneView, temperature_rise: float, max_frictional_power: float
+    ) -> tuple[float, float]:
         r"""Compute bounds on the future temperature rise.
 
         Parameters

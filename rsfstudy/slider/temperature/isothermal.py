@@ -12,4 +12,4 @@ class Isothermal(Temperature):
     """Constant temperature, as in steady sliding at the reference velocity."""
 
     name = "isothermal"
-    rejection_hint = "at constant temperature", "set temperature='shear_heating'"
+    rejection_condition_and_remedy = "at constant temperature", "set temperature='shear_heating'"

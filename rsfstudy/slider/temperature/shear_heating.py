@@ -145,14 +145,14 @@ class ShearHeating(Temperature):
     temperature_rate = staticmethod(compute_temperature_rate)
 
     @property
-    def activation(self) -> tuple[float, float]:
+    def activation_terms(self) -> tuple[float, float]:
         """Activation terms of the direct effect and of the evolution effect."""
         return self.direct_activation, self.evolution_activation
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the active physical effects of the part."""
-        return ("shear_heating", *("thermal_activation",) * any(self.activation))
+        return ("shear_heating", *("thermal_activation",) * any(self.activation_terms))
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
         r"""Return the parameters of ``compute_temperature_rate``.
@@ -161,7 +161,9 @@ class ShearHeating(Temperature):
         """
         return self.heating, self.cooling, self.heating * scene.mu_star
 
-    def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
+    def compute_temperature_rise_bounds(
+        self, scene: SceneView, temperature_rise: float, max_frictional_power: float
+    ) -> tuple[float, float]:
         """Compute bounds on the future temperature rise.
 
         See ``Temperature.rise_bounds``. At any time, the temperature evolves towards the steady
@@ -170,7 +172,9 @@ class ShearHeating(Temperature):
         """
         over_cooling = self.heating / self.cooling
         lowest = -over_cooling * scene.mu_star
-        return min(rise, lowest), max(rise, over_cooling * power + lowest)
+        return min(temperature_rise, lowest), max(
+            temperature_rise, over_cooling * max_frictional_power + lowest
+        )
 
     def check(self, scene: SceneView) -> None:
         """Check the activation terms and the temperature of the surroundings.
@@ -178,20 +182,22 @@ class ShearHeating(Temperature):
         See ``Part.check``. The activation terms require a law with one state. If the friction
         depends on temperature, the temperature of the surroundings must be positive.
         """
-        if any(self.activation):
+        if any(self.activation_terms):
             law = scene.parts.law
             if law.state_count > 1:
                 name = "direct_activation" if self.direct_activation else "evolution_activation"
                 rule = "requires a law with one state variable, but "
                 rule += f"law={law.name!r} has {law.state_count} state variables"
-                raise self.field_error(name, rule, f"Omit {name}, or choose another law.")
+                raise self.build_field_error(name, rule, f"Omit {name}, or choose another law.")
             hottest = self.cooling / scene.mu_star
             if self.heating >= hottest:
                 rule = f"must be less than cooling/mu_star = {hottest:g}, because otherwise the "
                 rule += "surroundings would be colder than absolute zero"
-                raise self.field_error("heating", rule, "Decrease heating, or increase cooling.")
+                raise self.build_field_error(
+                    "heating", rule, "Decrease heating, or increase cooling."
+                )
         if lacks_critical_stiffness(scene):
             rule = "gives no critical stiffness at V_*"
-            raise self.field_error(
+            raise self.build_field_error(
                 "heating", rule, "Pass stiffness instead of stiffness_ratio, or increase cooling."
             )

@@ -22,7 +22,7 @@ _INTERVALS_EXAMINED_BESIDE_CROSSING = 3
 _MIN_SLOPE_CHANGE_OVER_MAX_SLOPE = 1e-9
 #: Smallest change in slope that indicates an oscillation, relative to the largest change in slope
 #: and to the smallest slope of the neighbouring intervals.
-_MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE = 0.1
+_MIN_SLOPE_CHANGE_FOR_OSCILLATION = 0.1
 
 
 class CrossingSearchStatus(IntEnum):
@@ -48,9 +48,9 @@ class LevelCrossing(NamedTuple):
     """
 
     position: float
-    lower_bound: float
-    upper_bound: float
-    status: CrossingSearchStatus
+    position_lower_bound: float
+    position_upper_bound: float
+    search_status: CrossingSearchStatus
 
 
 def find_unique_crossing(x: np.ndarray, y: np.ndarray, level: float) -> LevelCrossing:
@@ -184,8 +184,8 @@ def _estimate_slope_changes(
         return turns, False
     largest = 2.0 * max(turns.values())
     # Small changes on either side of a kink, and noise, do not indicate an oscillation.
-    noticeable = _MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE * float(np.abs(within).max())
-    steady = largest < 2.0 * _MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE * float(
+    noticeable = _MIN_SLOPE_CHANGE_FOR_OSCILLATION * float(np.abs(within).max())
+    steady = largest < 2.0 * _MIN_SLOPE_CHANGE_FOR_OSCILLATION * float(
         np.abs(slopes[interval_numbers.start : interval_numbers.stop]).min()
     )
     return dict.fromkeys(interval_numbers, largest), not steady and _count_sign_reversals(

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_members
+from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_overrides
 from rsfstudy.error_boundary import ConstructorKeywordCheckMixin, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
@@ -26,12 +26,12 @@ DatasetOrArray = TypeVar("DatasetOrArray", xr.Dataset, xr.DataArray)
 
 #: Pairs of two items. The first item is the derivative of a result with respect to the values of
 #: some cells. The second item contains coordinates of these cells along some dimensions.
-DerivativesWithCellCoordinates = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
+DerivativesAndCellCoordinates = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
 #: Names of the reduction fields that determine the units of a result, by the suffix of the result
 #: name. Each field contains the name of a variable, and the units of the result are derived from
 #: the units of these variables.
-UnitFieldsByResultSuffix = Mapping[str, Sequence[str]]
+UnitFieldNamesByResultSuffix = Mapping[str, Sequence[str]]
 
 #: Value of the attribute ``comment`` of propagated errors.
 PROPAGATED_ERROR_COMMENT = (
@@ -102,7 +102,7 @@ class Reduction(ConstructorKeywordCheckMixin):
     #: name of the result. For ``("of",)``, the result has the units of the variable that the field
     #: ``of`` names. For ``("of", "on")``, the result has the units of the first variable divided by
     #: the units of the second variable. Results without an entry are dimensionless.
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {}
     #: True if the reduction also uses failed cells. All other reductions reject failed cells.
     uses_failed_cells: ClassVar[bool] = False
 
@@ -112,7 +112,7 @@ class Reduction(ConstructorKeywordCheckMixin):
     def __init_subclass__(cls) -> None:
         """Set the default ``kind`` of a subclass and accept former member names."""
         super().__init_subclass__()
-        add_new_names_for_former_members(cls)
+        add_new_names_for_former_overrides(cls)
         if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
             cls.kind = cls.__name__
 
@@ -154,7 +154,7 @@ class Reduction(ConstructorKeywordCheckMixin):
         described = {end: found.assign_attrs(comment=comment) for end, found in values.items()}
         return xr.Dataset({f"{self.name}{end}": found for end, found in described.items()})
 
-    def support_status(self, status: xr.DataArray) -> xr.DataArray:
+    def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
         """Return the status of the cells on which the results depend.
 
         The base class returns the status of all cells. A subclass that uses only some of the cells
@@ -173,7 +173,7 @@ class Reduction(ConstructorKeywordCheckMixin):
         """
         return status
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the result with respect to the cell values.
 
         A subclass must override this method to propagate the numerical errors of the cells to the
@@ -251,7 +251,7 @@ def find_worst_status_along_other_dims(
     return status.max([d for d in status.dims if d not in kept_dimensions])
 
 
-def set_unusable_values_to_nan(
+def set_failed_or_invalid_values_to_nan(
     dataset: xr.Dataset, variable_name: str, status: xr.DataArray
 ) -> xr.Dataset:
     """Replace the values of failed cells and invalid error bounds by NaN.

@@ -23,9 +23,9 @@ from rsfstudy.study.reductions._level_crossing import (
     find_unique_crossing,
 )
 from rsfstudy.study.reductions.base import (
-    DerivativesWithCellCoordinates,
+    DerivativesAndCellCoordinates,
     Reduction,
-    UnitFieldsByResultSuffix,
+    UnitFieldNamesByResultSuffix,
     depends_on_failed_cells,
     find_dimension_of_coordinate,
 )
@@ -75,7 +75,7 @@ class Boundary(Reduction):
     on: str = ""
     level: float = 0.5
     kind: ClassVar[str] = "boundary"
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("on",)}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Find the boundary for each point along the other dimensions.
@@ -212,7 +212,7 @@ class Inverse(Reduction):
     uncertainty: float | Mapping[str, float] = 0.0
     along: str = ""
     kind: ClassVar[str] = "inverse"
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("on",)}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("on",)}
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -248,8 +248,8 @@ class Inverse(Reduction):
             _find_coordinate_at_level,
             values,
             dataset[self.on].astype(float),
-            self._select_value_for_each_label(dataset, self.levels),
-            self._select_value_for_each_label(dataset, self.uncertainty),
+            self._broadcast_value_to_labels(dataset, self.levels),
+            self._broadcast_value_to_labels(dataset, self.uncertainty),
             input_core_dims=[[dimension], [dimension], [], []],
             output_core_dims=[[], [], []],
             vectorize=True,
@@ -267,7 +267,7 @@ class Inverse(Reduction):
             }
         )
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the crossing position.
 
         The interpolant is differentiated with respect to the value of each cell, and the derivative
@@ -289,14 +289,14 @@ class Inverse(Reduction):
             _compute_crossing_position_derivatives,
             dataset[self.of],
             dataset[self.on].astype(float),
-            self._select_value_for_each_label(dataset, self.levels),
+            self._broadcast_value_to_labels(dataset, self.levels),
             input_core_dims=[[dimension], [dimension], []],
             output_core_dims=[[dimension]],
             vectorize=True,
         )
         return [(by_cells, {})]
 
-    def _select_value_for_each_label(
+    def _broadcast_value_to_labels(
         self, dataset: xr.Dataset, value_or_values_by_label: float | Mapping[str, float]
     ) -> xr.DataArray:
         """Return the level or uncertainty that applies to each label."""
@@ -315,16 +315,18 @@ def _find_coordinate_at_level(
     if np.isnan(level) or level <= 0.0:
         return np.nan, np.nan, float(CrossingSearchStatus.OUT_OF_REACH)
     found = find_unique_crossing(x, y, np.log(level))
-    if found.status is not CrossingSearchStatus.OK:
-        return np.nan, np.nan, float(found.status)
+    if found.search_status is not CrossingSearchStatus.OK:
+        return np.nan, np.nan, float(found.search_status)
     ends = [
         find_unique_crossing(x, y, np.log(level) + d).position
         for d in (-log_level_uncertainty, log_level_uncertainty)
     ]
-    place, first, last = np.exp([found.position, found.lower_bound, found.upper_bound]).tolist()
+    place, first, last = np.exp(
+        [found.position, found.position_lower_bound, found.position_upper_bound]
+    ).tolist()
     error = max(place - first, last - place)
     error += place * float(np.max(np.abs(found.position - np.array(ends))))
-    return place, error, float(found.status)
+    return place, error, float(found.search_status)
 
 
 def _compute_crossing_position_derivatives(

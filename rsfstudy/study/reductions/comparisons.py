@@ -17,15 +17,15 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import CLOSED_FORMS
 from rsfstudy.study.reductions.base import (
-    DerivativesWithCellCoordinates,
+    DerivativesAndCellCoordinates,
     Reduction,
-    UnitFieldsByResultSuffix,
+    UnitFieldNamesByResultSuffix,
     depends_on_failed_cells,
     find_dimension_of_coordinate,
     select_coordinate_range,
 )
 
-DerivativesForValueAndReference = tuple[xr.DataArray, xr.DataArray]
+DerivativesWrtValueAndReference = tuple[xr.DataArray, xr.DataArray]
 
 
 @wrap_methods_in_error_boundary
@@ -62,7 +62,7 @@ class Difference(Reduction):
     along: str = ""
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of",)}
     formula_template: ClassVar[str] = "{of} minus {reference}"
 
     def compute_difference(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -84,7 +84,7 @@ class Difference(Reduction):
 
     def compute_partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
-    ) -> DerivativesForValueAndReference:
+    ) -> DerivativesWrtValueAndReference:
         """Compute the derivatives with respect to the value and the reference.
 
         Parameters
@@ -103,7 +103,7 @@ class Difference(Reduction):
         """
         return xr.ones_like(values), -xr.ones_like(values)
 
-    def support_status(self, status: xr.DataArray) -> xr.DataArray:
+    def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
         """Combine the status of each point with the status of the reference point.
 
         Parameters
@@ -142,7 +142,7 @@ class Difference(Reduction):
         note = self.formula_template.format(of=self.of, reference=f"its value at {place}")
         return xr.Dataset({self.name: compared.assign_attrs(comment=note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the result.
 
         At the reference point, the derivatives are 0 because the result does not depend on the
@@ -198,7 +198,7 @@ class RelativeDifference(Difference):
     """
 
     kind: ClassVar[str] = "relative_difference"
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {}
     formula_template: ClassVar[str] = "1 - {of} / {reference}"
 
     def compute_difference(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -220,7 +220,7 @@ class RelativeDifference(Difference):
 
     def compute_partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
-    ) -> DerivativesForValueAndReference:
+    ) -> DerivativesWrtValueAndReference:
         """Compute the derivatives with respect to the value and the reference.
 
         Parameters
@@ -273,9 +273,9 @@ class Range(Reduction):
     over: str = ""
     within: tuple[float, float] | None = None
     kind: ClassVar[str] = "range"
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of",)}
 
-    def support_status(self, status: xr.DataArray) -> xr.DataArray:
+    def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
         """Return the status of the cells in the coordinate range ``within``.
 
         Parameters
@@ -322,7 +322,7 @@ class Range(Reduction):
         note = f"largest minus smallest {self.of} along {self.over}{span}"
         return xr.Dataset({self.name: found.assign_attrs(comment=note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the range.
 
         The derivative is 1 for the cell whose value plus error is largest, and for the cell whose
@@ -392,7 +392,7 @@ class ClosedFormRatio(Reduction):
         "_closed_form": "closed-form value of {of}",
         "_error": "numerical error of the ratio of {of} to its closed-form value",
     }
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"_closed_form": ("of",)}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
         """Check that the closed-form solution exists."""
@@ -424,7 +424,7 @@ class ClosedFormRatio(Reduction):
         beside = {f"{self.name}_closed_form": exact.assign_attrs(comment=note)}
         return xr.Dataset({self.name: ratio, **beside})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the ratio (the reciprocal of the closed form).
 
         Parameters

@@ -15,9 +15,9 @@ import xarray as xr
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.study.reductions.base import (
-    DerivativesWithCellCoordinates,
+    DerivativesAndCellCoordinates,
     Reduction,
-    UnitFieldsByResultSuffix,
+    UnitFieldNamesByResultSuffix,
     depends_on_failed_cells,
     find_dimension_of_coordinate,
     select_coordinate_range,
@@ -64,10 +64,10 @@ class LinearFit(Reduction):
     within: tuple[float, float] | None = None
     #: Number of fitted parameters, followed by a template of the fitted equation. The placeholders
     #: are field names of the fit.
-    parameter_count: ClassVar[int] = 2
+    fitted_parameter_count: ClassVar[int] = 2
     formula_template: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of", "on"), "_misfit": ("of",)}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of", "on"), "_misfit": ("of",)}
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Subtract the mean of the values to eliminate the constant of the fit.
@@ -86,7 +86,7 @@ class LinearFit(Reduction):
         """
         return values - values.mean(dimension)
 
-    def support_status(self, status: xr.DataArray) -> xr.DataArray:
+    def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
         """Return the status of the cells in the coordinate range ``within``.
 
         Parameters
@@ -125,15 +125,15 @@ class LinearFit(Reduction):
         support = select_coordinate_range(dataset, self.on, self.within)
         if support.sizes[dimension] == 0:
             return xr.Dataset()
-        x, y = self._compute_centred_fit_coordinates(support)
+        x, y = self._compute_centred_abscissa_and_ordinate(support)
         count = y.notnull().sum(dimension)
         slope = (x * y).sum(dimension) / (x**2).sum(dimension)
         misfit = y - slope * x
-        freedom = count - self.parameter_count
+        freedom = count - self.fitted_parameter_count
         spread = (misfit**2).sum(dimension) / freedom.where(freedom > 0)
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
-        known = (count >= self.parameter_count) & ~depends_on_failed_cells(
+        known = (count >= self.fitted_parameter_count) & ~depends_on_failed_cells(
             support, self.of, dimension
         )
         found = {
@@ -148,7 +148,7 @@ class LinearFit(Reduction):
         result = self.results(f"least-squares fit of {law} for {span}", found)
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the slope with respect to the cell values.
 
         The slope is a linear combination of the values, and the derivatives are the coefficients.
@@ -164,12 +164,12 @@ class LinearFit(Reduction):
             Pairs of a derivative and the position of the cells, as described in
             `Reduction.derivatives`.
         """
-        x, _y = self._compute_centred_fit_coordinates(
+        x, _y = self._compute_centred_abscissa_and_ordinate(
             select_coordinate_range(dataset, self.on, self.within)
         )
         return [((x / (x**2).sum(find_dimension_of_coordinate(dataset, self.on))).fillna(0.0), {})]
 
-    def _compute_centred_fit_coordinates(
+    def _compute_centred_abscissa_and_ordinate(
         self, selected_points: xr.Dataset
     ) -> tuple[xr.DataArray, xr.DataArray]:
         """Return the transformed and centred coordinate and variable.
@@ -257,7 +257,7 @@ class ProportionalFit(LinearFit):
     """
 
     intercept: float = 0.0
-    parameter_count: ClassVar[int] = 1
+    fitted_parameter_count: ClassVar[int] = 1
     kind: ClassVar[str] = "proportional_fit"
     formula_template: ClassVar[str] = "{of} = {intercept:g} + {name} * {on}"
 
@@ -331,7 +331,7 @@ class SemilogFit(LinearFit):
     """
 
     kind: ClassVar[str] = "decade_fit"
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of",)}
     formula_template: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
     def transform_abscissa(self, coordinate_values: xr.DataArray) -> xr.DataArray:
@@ -388,7 +388,7 @@ class PowerLaw(SemilogFit):
     """
 
     kind: ClassVar[str] = "power_law"
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {}
     formula_template: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
@@ -406,7 +406,7 @@ class PowerLaw(SemilogFit):
         """
         return self.transform_abscissa(values)
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the exponent with respect to the cell values.
 
         The derivatives are the coefficients of the linear fit divided by ``ln(10) * of``.

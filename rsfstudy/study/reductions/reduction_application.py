@@ -20,7 +20,7 @@ from rsfstudy.study.reductions.base import (
     find_worst_status_along_other_dims,
     is_failed_or_pending,
     set_failed_cells_to_nan,
-    set_unusable_values_to_nan,
+    set_failed_or_invalid_values_to_nan,
 )
 from rsfstudy.study.reductions.boundaries import Boundary, Inverse
 from rsfstudy.study.reductions.comparisons import (
@@ -132,7 +132,7 @@ def apply_reductions(
         own = find_worst_status_along_other_dims(support["status"], support[reduction.of].dims)
         if not reduction.uses_failed_cells:
             own = drawn.get(reduction.of, own)
-        support = set_unusable_values_to_nan(support, reduction.of, own)
+        support = set_failed_or_invalid_values_to_nan(support, reduction.of, own)
         found: object = reduction(support)  # A user-defined reduction may return any object.
         if not isinstance(found, xr.Dataset):
             rule = "must return an xarray.Dataset of the new variables"
@@ -150,7 +150,7 @@ def apply_reductions(
                 )
                 raise InvalidValue("reduction", reduction.name, rule)
             drawn[str(name)] = find_worst_status_along_other_dims(
-                reduction.support_status(support["status"]), values.dims
+                reduction.get_status_of_used_cells(support["status"]), values.dims
             )
             if bool(is_failed_or_pending(drawn[str(name)]).any()):
                 values.attrs.setdefault(

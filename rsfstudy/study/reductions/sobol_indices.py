@@ -121,7 +121,7 @@ class SobolIndices(Reduction):
         for place in np.ndindex(*of.shape[:-1]):
             values = of.values[place]
             if not bool(bad.isel(dict(zip(others, place, strict=True)))) and np.ptp(values) > 0.0:
-                found[place] = _compute_indices_with_intervals(values.reshape(-1, d + 2).T)
+                found[place] = _compute_indices_and_bootstrap_bounds(values.reshape(-1, d + 2).T)
         lost = int(of.isnull().sum())
         about = {"comment": f"confidence intervals from {_BOOTSTRAP_RESAMPLES} bootstrap resamples"}
         if lost:
@@ -158,7 +158,7 @@ class SobolIndices(Reduction):
         return inputs
 
 
-def _compute_indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
+def _compute_indices_and_bootstrap_bounds(sample_values: np.ndarray) -> np.ndarray:
     """Compute Sobol indices with confidence intervals.
 
     Parameters

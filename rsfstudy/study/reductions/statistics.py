@@ -24,9 +24,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.status import Status
 from rsfstudy.study.reductions.base import (
-    DerivativesWithCellCoordinates,
+    DerivativesAndCellCoordinates,
     Reduction,
-    UnitFieldsByResultSuffix,
+    UnitFieldNamesByResultSuffix,
     depends_on_failed_cells,
 )
 from rsfstudy.study.reductions.result_units import find_scale_varying_along_dimensions
@@ -55,7 +55,7 @@ class _SampleStatistic(Reduction):
         "_stderr": "sampling standard error of {name}",
         "_points": "number of samples with a value of {name}",
     }
-    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",), "_stderr": ("of",)}
+    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of",), "_stderr": ("of",)}
     #: Description of the statistic for the attribute ``comment`` of the results.
     description: ClassVar[str]
 
@@ -106,7 +106,7 @@ class _SampleStatistic(Reduction):
         InvalidValue
             If the variable does not have the dimension of the samples.
         """
-        of, why = _select_sampled_variable(self, dataset), ""
+        of, why = _select_variable_to_reduce(self, dataset), ""
         count = of.notnull().sum(self.over)
         bad = depends_on_failed_cells(dataset, self.of, self.over)
         if varied := find_scale_varying_along_dimensions(
@@ -210,7 +210,7 @@ class Mean(_SampleStatistic):
             sample_values, self.over
         ) / count**0.5
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the mean (the reciprocal of the sample count).
 
         Parameters
@@ -224,7 +224,7 @@ class Mean(_SampleStatistic):
             Pairs of a derivative and the position of the cells, as described in
             `Reduction.derivatives`.
         """
-        has = _select_sampled_variable(self, dataset).notnull()
+        has = _select_variable_to_reduce(self, dataset).notnull()
         return [(has / has.sum(self.over), {})]
 
 
@@ -300,7 +300,7 @@ class StandardDeviation(_SampleStatistic):
         scatter = compute_standard_deviation(without, self.over, 0) * (count - 1.0) ** 0.5
         return compute_standard_deviation(sample_values, self.over), scatter
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         r"""Compute the derivatives of the standard deviation.
 
         Parameters
@@ -320,7 +320,7 @@ class StandardDeviation(_SampleStatistic):
 
         .. math:: \frac{\partial s}{\partial y_i} = \frac{y_i - \bar{y}}{(n - 1) s}.
         """
-        of = _select_sampled_variable(self, dataset)
+        of = _select_variable_to_reduce(self, dataset)
         freedom = of.notnull().sum(self.over) - 1
         by = (of - of.mean(self.over)) / (freedom * compute_standard_deviation(of, self.over))
         return [(by.fillna(0.0), {})]
@@ -443,7 +443,7 @@ class Quantile(_SampleStatistic):
         found, beside = super().__call__(dataset), f"{self.of}_error"
         if beside not in dataset:
             return found
-        of, at = _select_sampled_variable(self, dataset), xr.DataArray(self.level)
+        of, at = _select_variable_to_reduce(self, dataset), xr.DataArray(self.level)
         errors = dataset[beside].reset_coords(drop=True)
         errors = (errors + sys.float_info.epsilon * abs(of)).fillna(np.inf)
         low, high = (
@@ -513,7 +513,7 @@ class StatusShares(Reduction):
         """Quantities that describe the shares, their errors and the new dimension."""
         return [*super().quantities, Quantity("ended", "", "", "status of a sample")]
 
-    def support_status(self, status: xr.DataArray) -> xr.DataArray:
+    def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
         """Replace the status of all computed cells by ``OK``.
 
         Failed cells contribute to the shares, so they do not invalidate the result.
@@ -548,7 +548,7 @@ class StatusShares(Reduction):
         InvalidValue
             If the variable does not have the dimension of the samples.
         """
-        _select_sampled_variable(self, dataset)
+        _select_variable_to_reduce(self, dataset)
         status = dataset["status"].reset_coords(drop=True)
         statuses = [status for status in Status if status is not Status.PENDING]
         codes = xr.DataArray(
@@ -606,7 +606,7 @@ class Logarithm(Reduction):
         note = {"comment": f"natural logarithm of the numerical value of {self.of}"}
         return xr.Dataset({self.name: logarithm.drop_attrs(deep=False).assign_attrs(note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the logarithm (the reciprocal of the variable).
 
         Parameters
@@ -624,7 +624,7 @@ class Logarithm(Reduction):
         return [((1.0 / of.where(of > 0.0)).fillna(0.0), {})]
 
 
-def _select_sampled_variable(
+def _select_variable_to_reduce(
     reduction: _SampleStatistic | StatusShares, dataset: xr.Dataset
 ) -> xr.DataArray:
     """Return the variable to reduce, without auxiliary coordinates.

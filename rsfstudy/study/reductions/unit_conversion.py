@@ -12,7 +12,7 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.rig import DatasetUnits, compute_conversion_factor
-from rsfstudy.study.reductions.base import DerivativesWithCellCoordinates, Reduction
+from rsfstudy.study.reductions.base import DerivativesAndCellCoordinates, Reduction
 
 
 @wrap_methods_in_error_boundary
@@ -80,10 +80,12 @@ class InUnits(Reduction):
             "units": self.units,
             "comment": f"{self.of}, converted in each cell with the scales of the cell",
         }
-        values = (dataset[self.of] * self._compute_scale_factor(dataset)).drop_attrs(deep=False)
+        values = (dataset[self.of] * self._compute_unit_conversion_factor(dataset)).drop_attrs(
+            deep=False
+        )
         return xr.Dataset({self.name: values.assign_attrs(about)})
 
-    def derivatives(self, dataset: xr.Dataset) -> DerivativesWithCellCoordinates:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Return the scale factor of each cell.
 
         Parameters
@@ -97,11 +99,13 @@ class InUnits(Reduction):
             Pairs of a derivative and the position of the cells, as described in
             `Reduction.derivatives`.
         """
-        return [(self._compute_scale_factor(dataset) * xr.ones_like(dataset[self.of]), {})]
+        return [
+            (self._compute_unit_conversion_factor(dataset) * xr.ones_like(dataset[self.of]), {})
+        ]
 
-    def _compute_scale_factor(self, dataset: xr.Dataset) -> xr.DataArray:
+    def _compute_unit_conversion_factor(self, dataset: xr.Dataset) -> xr.DataArray:
         """Compute the scale of each cell in the requested units."""
-        scale = DatasetUnits(dataset).find_scale_of_variable(self.of)
+        scale = DatasetUnits(dataset).find_unit_scale_of_variable(self.of)
         if scale is None:
             raise InvalidValue(
                 "of", self.of, "has no scale, so it cannot be converted to units of a rig"
