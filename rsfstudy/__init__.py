@@ -15,9 +15,9 @@ from rsfstudy._deprecation import NEW_NAME_BY_OWNER_AND_FORMER_NAME, warn_rename
 
 if TYPE_CHECKING:
     from rsfstudy.api.event_catalogue import events as events
-    from rsfstudy.api.fit_record import fit as fit
     from rsfstudy.api.healing_tables import healing as healing
     from rsfstudy.api.html_report import report as report
+    from rsfstudy.api.record_fitting import fit as fit
     from rsfstudy.api.simulation import simulate as simulate
     from rsfstudy.api.single_scene_measures import critical_step as critical_step
     from rsfstudy.api.single_scene_measures import limit_cycle as limit_cycle
@@ -58,7 +58,7 @@ _EXPORTED_NAMES_BY_MODULE = {
     "rig.rig": ("Rig",),
     "rig.record_files": ("read_record",),
     "rig.table_files": ("read_table",),
-    "api.fit_record": ("fit",),
+    "api.record_fitting": ("fit",),
     "rig.protocol_files": ("history", "read_protocol"),
     "plots._healing": ("plot_healing",),
     "plots._motion": ("plot_motion",),

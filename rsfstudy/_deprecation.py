@@ -182,7 +182,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.rig.table_files": {
         "Selected": "ColumnSelection",
     },
-    "rsfstudy.rig.columns:Column": {
+    "rsfstudy.rig.table_columns:Column": {
         "number": "one_based_column_number",
         "lines": "line_numbers",
         "place": "format_location_of_row",
@@ -544,10 +544,10 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.plots._style:style_context()": {
         "over": "user_styles",
     },
-    "rsfstudy.plots._agreement:draw_agreement()": {
+    "rsfstudy.plots._reference_agreement:draw_agreement()": {
         "enough": "required_digits",
     },
-    "rsfstudy.plots._text:format_slope()": {
+    "rsfstudy.plots._text_formatting:format_slope()": {
         "most": "max_decimals",
     },
     "rsfstudy.storage.results_comparison:ResultsComparison": {

@@ -33,7 +33,7 @@ NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE = {
     "measures.linear_stability": ("responses.linear_stability", "measures"),
     "measures.rigid_response": ("responses.rigid_response", "measures"),
     "measures.step_response": ("responses.step_response", "measures"),
-    "measures.triggered": ("critical_steps.triggered", "measures"),
+    "measures.triggered": ("critical_steps.triggered_instability", "measures"),
     "measures.velocity_step": ("responses.velocity_step", "measures"),
     "quantity": ("quantities", "measures"),
     "reduce": ("reductions", ""),

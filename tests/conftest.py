@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from matplotlib.mathtext import MathTextParser
 
-from rsfstudy.execution import clusters, provenance, worker_pool
+from rsfstudy.execution import dask_clusters, provenance, worker_pool
 
 settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -106,5 +106,5 @@ def formulas_are_set_once():
 def cluster(tmp_path_factory):
     """Yield a Dask client of a cluster with two worker processes."""
     log = tmp_path_factory.mktemp("cluster") / "workers.log"
-    with clusters.start_local_cluster(2, log) as client:
+    with dask_clusters.start_local_cluster(2, log) as client:
         yield client

@@ -37,7 +37,7 @@ from study_runs import (
 
 import rsfstudy
 from rsfstudy.errors import RunError
-from rsfstudy.execution import clusters, provenance
+from rsfstudy.execution import dask_clusters, provenance
 
 CLUSTERS = Path(__file__).parent.parent / "studies" / "clusters"
 #: Kubernetes objects of the page, by kind and name.
@@ -128,7 +128,7 @@ def separate(started):
 
 def test_the_same_bits_as_in_this_process(separate, tmp_path):
     """The results are bitwise identical, and the workers write no files."""
-    with clusters.connect_to_cluster(separate.address, timeout=HANG_TIMEOUT) as client:
+    with dask_clusters.connect_to_cluster(separate.address, timeout=HANG_TIMEOUT) as client:
         client.wait_for_workers(2)
         have_same_numbers(run(SMALL_STUDY, client=client, output=tmp_path / "results"), run())
     assert sorted(os.listdir(tmp_path / "results")) == ["small.cells.sqlite", "small.nc"]
@@ -208,7 +208,7 @@ def test_a_scheduler_by_tls():
         1, processes=False, protocol="tls", security=security, **QUIET_CLUSTER_OPTIONS
     ) as encrypted:
         connected = functools.partial(
-            clusters.connect_to_cluster, encrypted.scheduler_address, timeout=HANG_TIMEOUT
+            dask_clusters.connect_to_cluster, encrypted.scheduler_address, timeout=HANG_TIMEOUT
         )
         with dask.config.set(names), connected() as client:
             have_same_numbers(run(client=client), run())
@@ -222,7 +222,7 @@ def test_a_scheduler_by_tls():
 def test_a_scheduler_that_does_not_answer_is_named(address):
     with (
         pytest.raises(RunError, match=re.escape(f"no Dask scheduler responds at {address!r}")),
-        clusters.connect_to_cluster(address, timeout=0.3),
+        dask_clusters.connect_to_cluster(address, timeout=0.3),
     ):
         pass
 
@@ -232,7 +232,7 @@ def test_a_port_that_listens_and_says_nothing():
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with (
             pytest.raises(RunError, match="no Dask scheduler responds"),
-            clusters.connect_to_cluster(address, timeout=0.3),
+            dask_clusters.connect_to_cluster(address, timeout=0.3),
         ):
             pass
 

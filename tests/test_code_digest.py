@@ -18,7 +18,7 @@ from rsfstudy import measures
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.execution import code_digest, provenance
-from rsfstudy.execution.module_graph import ModuleImportGraph
+from rsfstudy.execution.module_import_graph import ModuleImportGraph
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.reductions import Reduction

@@ -30,7 +30,7 @@ from rsfstudy.cli import assignment_parsing
 from rsfstudy.cli.study_results import StudyResults, print_failed_cells
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RunError
-from rsfstudy.execution import clusters, study_run, worker_pool
+from rsfstudy.execution import dask_clusters, study_run, worker_pool
 from rsfstudy.execution.cell_plan import CellBatchIterator
 from rsfstudy.reductions import LinearFit, Range, apply_reductions
 from rsfstudy.reporting import cell_tables
@@ -107,7 +107,7 @@ def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
 def sturdy(tmp_path_factory):
     """Start a cluster whose worker restarts after a crash."""
     log = tmp_path_factory.mktemp("sturdy") / "workers.log"
-    with clusters.start_local_cluster(1, log) as client:
+    with dask_clusters.start_local_cluster(1, log) as client:
         yield client, log
 
 

@@ -22,7 +22,7 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue
-from rsfstudy.plots import _style, _text
+from rsfstudy.plots import _style, _text_formatting
 from rsfstudy.quantities import Quantity
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.storage import dataset_files
@@ -445,7 +445,7 @@ def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_pat
     ],
 )
 def test_words(text, written):
-    assert _text.convert_symbols_to_mathtext(text) == written
+    assert _text_formatting.convert_symbols_to_mathtext(text) == written
 
 
 @pytest.mark.parametrize(("count", "columns"), [(5, 4), (7, 3), (4, 2), (3, 5)])
@@ -465,5 +465,5 @@ def test_a_legend_is_read_line_by_line(count, columns):
 def test_units_stay_with_the_last_word(units):
     about = Quantity("recurrence", "", units, "recurrence interval of stick-slip")
     for width in range(8, 60):
-        last = _text.format_quantity_axis_label(about, width).split("\n")[-1]
+        last = _text_formatting.format_quantity_axis_label(about, width).split("\n")[-1]
         assert re.match(r"(?!\().*\(.*\)$", last)

@@ -11,7 +11,7 @@ from motion_helpers import reaches_instability_norm
 
 from rsfstudy import Scene, simulate
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.triggered import Triggered
+from rsfstudy.critical_steps.triggered_instability import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import fall, maximum

@@ -12,7 +12,7 @@ import xarray as xr
 
 import rsfstudy
 from rsfstudy import Accuracy, Scene
-from rsfstudy.api import fit_record
+from rsfstudy.api import record_fitting
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import Record
 from rsfstudy.fitting.hold_table import fit_healing_rate
@@ -167,7 +167,7 @@ def test_fit_counts_the_error_of_a_measured_stiffness(monkeypatch: pytest.Monkey
     options = {**synthetic.FIT_OPTIONS, "laws": ["slowness"], "noise": "ar1"}
     spread = 0.03
     monkeypatch.setattr(
-        fit_record, "_measure_stiffness_in_records", lambda _records: (3e-3, 0.0, spread)
+        record_fitting, "_measure_stiffness_in_records", lambda _records: (3e-3, 0.0, spread)
     )
     measured = rsfstudy.fit(record, **options | {"stiffness": "from record"}).squeeze()
     exact, softer, stiffer = (
@@ -188,7 +188,7 @@ def test_fit_uses_the_stiffness_of_the_record() -> None:
     with pytest.raises(InvalidValue, match="portion of the record in which the fault is locked"):
         rsfstudy.fit(flat, stiffness="from record", laws=["slowness"])
     held = synthetic.synthetic_record(synthetic.SLIDE_HOLD_SLIDE, size=1e-4)
-    ratio, machine, spread = fit_record._measure_stiffness_in_records([held])
+    ratio, machine, spread = record_fitting._measure_stiffness_in_records([held])
     assert machine == 0.0
     assert 0.0 < spread < 0.2
     assert abs(np.log(ratio / synthetic.EXACT_PARAMETERS["stiffness"])) < 3.0 * spread

@@ -9,9 +9,9 @@ from study_runs import named_results, run
 import rsfstudy
 from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.errors import DataError
-from rsfstudy.plots import _text, lines
+from rsfstudy.plots import _text_formatting, lines
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.rig.dataset_scales import UnitScale, multiply_variables_by_unit_scales
+from rsfstudy.rig.dataset_unit_scales import UnitScale, multiply_variables_by_unit_scales
 from rsfstudy.status import Status
 from rsfstudy.study import study_loader
 
@@ -147,6 +147,6 @@ def test_labels_of_errors_of_samples_are_short(tmp_path_factory):
 
 
 def test_errors_too_small_to_show_are_left_out():
-    assert _text.format_value_with_error(1.33333334, 8e-9, 4) == "$1.3333$"
-    assert _text.format_value_with_error(0.857, 0.007, 4) == r"$0.857 \pm 0.007$"
-    assert _text.format_value_with_error(0.857, 0.00006, 4) == r"$0.85700 \pm 0.00006$"
+    assert _text_formatting.format_value_with_error(1.33333334, 8e-9, 4) == "$1.3333$"
+    assert _text_formatting.format_value_with_error(0.857, 0.007, 4) == r"$0.857 \pm 0.007$"
+    assert _text_formatting.format_value_with_error(0.857, 0.00006, 4) == r"$0.85700 \pm 0.00006$"

@@ -11,7 +11,7 @@ from rsfstudy.named_studies._bifurcation import Bifurcation
 from study_runs import run, study_of
 
 from rsfstudy import Axis, Scene, Segment, protocol, simulate
-from rsfstudy.critical_steps.triggered import Triggered
+from rsfstudy.critical_steps.triggered_instability import Triggered
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy

@@ -17,10 +17,10 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import DataError
 from rsfstudy.execution import cell_computation, provenance
 from rsfstudy.execution.cell_plan import compute_cell_key
-from rsfstudy.execution.module_graph import ModuleImportGraph
+from rsfstudy.execution.module_import_graph import ModuleImportGraph
 from rsfstudy.measures import CriticalStep, Elasticities, LimitCycle, LinearStability
 from rsfstudy.slider import part_registry
-from rsfstudy.storage import fingerprints, stored_declarations
+from rsfstudy.storage import run_fingerprints, stored_declarations
 
 PACKAGE = Path(rsfstudy.__file__).parent
 SOURCES = provenance.read_source_files_affecting_results(PACKAGE)
@@ -178,19 +178,19 @@ def test_no_other_package_leads_to_the_physics():
 @pytest.mark.parametrize("older", ["0123456789abcdef", None, 5])
 def test_older_fingerprints_have_one_digest(older):
     now = {"physics": {"slider.friction": "ab", "slider.scene": "cd"}}
-    ((name, (there, here)),) = fingerprints.find_fingerprint_differences(
+    ((name, (there, here)),) = run_fingerprints.find_fingerprint_differences(
         {"physics": older}, now
     ).items()
     assert (name, there, len(here)) == ("physics", older, 16)
-    assert fingerprints.merge_fingerprints({"physics": older}, now) == now
+    assert run_fingerprints.merge_fingerprints({"physics": older}, now) == now
 
 
 def test_a_difference_lists_the_first_modules_that_changed():
     then, now = ({"physics": {f"m{n:02}": text for n in range(20)}} for text in ("ab", "cd"))
     now["physics"]["m00"] = "ab"
-    ((name, (there, here)),) = fingerprints.find_fingerprint_differences(then, now).items()
+    ((name, (there, here)),) = run_fingerprints.find_fingerprint_differences(then, now).items()
     assert (name, there == here) == ("physics (m01, m02, m03, ..., m19)", False)
-    assert fingerprints.find_fingerprint_differences(then, then) == {}
+    assert run_fingerprints.find_fingerprint_differences(then, then) == {}
 
 
 # ---- keys of cells -------------------------------------------------------------------------------

@@ -24,9 +24,9 @@ from scipy.io import savemat
 import rsfstudy
 from rsfstudy.errors import CallError, DataError, InvalidValue
 from rsfstudy.rig import readers
-from rsfstudy.rig.columns import Column
 from rsfstudy.rig.readers import spreadsheets, text_layout
 from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
+from rsfstudy.rig.table_columns import Column
 
 ROWS = 40
 TIME = 0.25 * np.arange(ROWS)

@@ -19,7 +19,7 @@ from study_runs import HANG_TIMEOUT, call_main, example_claim, run
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
-from rsfstudy.plots import _size
+from rsfstudy.plots import _figure_size
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
 from rsfstudy.storage import dataset_files
@@ -192,7 +192,7 @@ def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_pat
         in text
     )
     with plots.style_context():
-        wide = f"--inches: {_size.compute_figure_size_in_inches(2, 1)[0]:.3g}"
+        wide = f"--inches: {_figure_size.compute_figure_size_in_inches(2, 1)[0]:.3g}"
     assert [about["style"] for about in Page(text).all("img")] == [wide] * 3
 
 

@@ -8,7 +8,7 @@ import pytest
 import rsfstudy
 from rsfstudy import Rig, Scene, Study
 from rsfstudy.cli.file_summaries import FileSummary, print_file_summary
-from rsfstudy.critical_steps.triggered import Triggered
+from rsfstudy.critical_steps.triggered_instability import Triggered
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 

@@ -16,7 +16,7 @@ from rsfstudy.named_studies._normal_stress_transient import NormalStressTransien
 
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.triggered import Triggered
+from rsfstudy.critical_steps.triggered_instability import Triggered
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY

@@ -25,7 +25,7 @@ from rsfstudy.motion.in_place_functions import (
 )
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.motion_loop import move_step_begin_to_step_end
-from rsfstudy.motion.steppers import Stepper, unrolled_step
+from rsfstudy.motion.steppers import Stepper, unrolled_runge_kutta_step
 from rsfstudy.motion.steppers.order_eight import OrderEightStepper
 from rsfstudy.motion.steppers.scipy import (
     SCIPY_SOLVER_BY_METHOD_NAME,
@@ -91,18 +91,29 @@ def plain_step(equations: EquationsOfMotion, y, length: float, tolerance: float)
 @pytest.mark.parametrize(("equations", "y"), SYSTEMS)
 def test_the_unrolled_step_is_that_of_plain_loops_to_the_bit(equations, y, length):
     n, tolerance = len(y), 1e-6
-    attempt = unrolled_step.build_step_attempt_function(
+    attempt = unrolled_runge_kutta_step.build_step_attempt_function(
         equations.rate_function, n, build_array_unpacking_function(len(equations.parameters))
     )
-    block = [math.nan] * (unrolled_step.HEADER_SIZE + 2 * n)
-    block[unrolled_step.LENGTH_INDEX], block[unrolled_step.TOLERANCE_INDEX] = length, tolerance
-    block[unrolled_step.HEADER_SIZE + n :] = equations.unknown_scales
-    stages = [*equations.evaluate_rates(y), *[math.nan] * (n * unrolled_step.STAGE_COUNT)]
+    block = [math.nan] * (unrolled_runge_kutta_step.HEADER_SIZE + 2 * n)
+    (
+        block[unrolled_runge_kutta_step.LENGTH_INDEX],
+        block[unrolled_runge_kutta_step.TOLERANCE_INDEX],
+    ) = length, tolerance
+    block[unrolled_runge_kutta_step.HEADER_SIZE + n :] = equations.unknown_scales
+    stages = [
+        *equations.evaluate_rates(y),
+        *[math.nan] * (n * unrolled_runge_kutta_step.STAGE_COUNT),
+    ]
     attempt(y, stages, equations.parameters, block)
     by_loops, new, error = plain_step(equations, y, length, tolerance)
     assert stages == [rate for stage in by_loops for rate in stage]
-    assert tuple(block[unrolled_step.HEADER_SIZE : unrolled_step.HEADER_SIZE + n]) == new
-    assert block[unrolled_step.ERROR_INDEX] == error
+    assert (
+        tuple(
+            block[unrolled_runge_kutta_step.HEADER_SIZE : unrolled_runge_kutta_step.HEADER_SIZE + n]
+        )
+        == new
+    )
+    assert block[unrolled_runge_kutta_step.ERROR_INDEX] == error
     assert error > 0.0
 
 

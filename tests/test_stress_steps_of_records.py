@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 from synthetic_records import deviation_in_stderrs
 
 import rsfstudy
+from rsfstudy.fitting.normal_stress_steps import find_normal_stress_steps
 from rsfstudy.fitting.record import Record
-from rsfstudy.fitting.stress_steps import find_normal_stress_steps
 from rsfstudy.status import Status
 
 #: Parameters in um and s. The stiffness of the machine is in MPa/um.

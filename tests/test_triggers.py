@@ -11,7 +11,7 @@ from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
     build_events_testing_monotone_rise,
     is_slip_rate_rise_monotone,
 )
-from rsfstudy.critical_steps.triggered import Triggered
+from rsfstudy.critical_steps.triggered_instability import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum

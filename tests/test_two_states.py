@@ -12,7 +12,7 @@ import pytest
 from rsfstudy import Scene, simulate
 from rsfstudy.critical_steps import motion_after_step, stability_after_step
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.triggered import Triggered
+from rsfstudy.critical_steps.triggered_instability import Triggered
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY

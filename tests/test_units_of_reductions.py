@@ -24,7 +24,7 @@ from rsfstudy.reductions import (
 )
 from rsfstudy.reporting import lattice_tables, reduction_tables
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.rig.dataset_scales import convert_to_display_units
+from rsfstudy.rig.dataset_unit_scales import convert_to_display_units
 from rsfstudy.study.reductions.base import read_quantities_not_in_vocabulary
 from rsfstudy.study.reductions.unit_conversion import InUnits
 

@@ -12,8 +12,12 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.api.fit_record import DEFAULT_FREE_PARAMETERS, STIFFNESS_OPTION_FROM_RECORD, fit
     from rsfstudy.api.html_report import write_html_report
+    from rsfstudy.api.record_fitting import (
+        DEFAULT_FREE_PARAMETERS,
+        STIFFNESS_OPTION_FROM_RECORD,
+        fit,
+    )
     from rsfstudy.api.result_paths import find_results_file
     from rsfstudy.api.simulation import UNPHYSICAL_MOTION_ATTRIBUTE_NAME, simulate
     from rsfstudy.api.study_runs import (
@@ -25,7 +29,11 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "api.fit_record": ("DEFAULT_FREE_PARAMETERS", "STIFFNESS_OPTION_FROM_RECORD", "fit"),
+            "api.record_fitting": (
+                "DEFAULT_FREE_PARAMETERS",
+                "STIFFNESS_OPTION_FROM_RECORD",
+                "fit",
+            ),
             "api.html_report": ("write_html_report",),
             "api.result_paths": ("find_results_file",),
             "api.simulation": ("BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME", "simulate"),

@@ -13,13 +13,13 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.critical_steps.critical_step import CriticalStep
-    from rsfstudy.critical_steps.triggered import Triggered
+    from rsfstudy.critical_steps.triggered_instability import Triggered
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "critical_steps.critical_step": ("CriticalStep",),
-            "critical_steps.triggered": ("Triggered",),
+            "critical_steps.triggered_instability": ("Triggered",),
         },
     )
 

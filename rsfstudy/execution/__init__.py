@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rsfstudy.execution.cell_plan import (
         CellPlan,
     )
-    from rsfstudy.execution.clusters import connect_to_cluster
+    from rsfstudy.execution.dask_clusters import connect_to_cluster
     from rsfstudy.execution.provenance import build_provenance_attributes, collect_run_fingerprint
     from rsfstudy.execution.study_run import OutputOptions, ProgressCallback
     from rsfstudy.execution.study_run_preparation import prepare_study_run
@@ -26,7 +26,7 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "execution.clusters": ("connect_to_cluster",),
+            "execution.dask_clusters": ("connect_to_cluster",),
             "execution.cell_plan": ("CellPlan",),
             "execution.study_run_preparation": ("prepare_study_run",),
             "execution.provenance": ("build_provenance_attributes", "collect_run_fingerprint"),

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.execution import code_digest
-from rsfstudy.execution.module_graph import ModuleImportGraph
+from rsfstudy.execution.module_import_graph import ModuleImportGraph
 from rsfstudy.motion import Engine
 from rsfstudy.slider import Scene
 

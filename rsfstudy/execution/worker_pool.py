@@ -35,7 +35,7 @@ from rsfstudy.execution.cell_computation import (
     serialize_cell_settings,
 )
 from rsfstudy.execution.cell_plan import CellBatchIterator
-from rsfstudy.execution.clusters import check_script_has_main_guard, start_local_cluster
+from rsfstudy.execution.dask_clusters import check_script_has_main_guard, start_local_cluster
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Class of each view, as module and name. The modules import Panel.
 _MODULE_AND_CLASS_BY_VIEW_KIND = {
-    "scene": ("rsfstudy.explorer.scene_view", "SceneView"),
+    "scene": ("rsfstudy.explorer.simulation_view", "SceneView"),
     "results": ("rsfstudy.explorer.results_view", "ResultsView"),
     "record": ("rsfstudy.explorer.record_view", "RecordView"),
 }

@@ -20,13 +20,13 @@ from rsfstudy.fitting.load_point_noise import (
     copy_steps_shifted_by_their_errors,
     integrate_load_point_velocity,
 )
+from rsfstudy.fitting.normal_stress_steps import MIN_RELATIVE_NORMAL_STRESS_CHANGE
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.recorded_loading import (
     build_loading_history,
     build_stepwise_loading_history,
     find_steps_between,
 )
-from rsfstudy.fitting.stress_steps import MIN_RELATIVE_NORMAL_STRESS_CHANGE
 from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
 from rsfstudy.fitting.window_model import WindowModel, scene_to_parameters
 from rsfstudy.motion import Integrator, MotionStopped

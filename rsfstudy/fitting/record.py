@@ -19,7 +19,7 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.holds import measure_holds
 from rsfstudy.fitting.locked_portion_stiffness import measure_stiffness
-from rsfstudy.fitting.stress_steps import (
+from rsfstudy.fitting.normal_stress_steps import (
     find_normal_stress_steps,
     merge_normal_stress_and_velocity_steps,
     set_normal_stresses_of_steps,

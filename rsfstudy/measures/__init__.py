@@ -15,7 +15,7 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.critical_steps.critical_step import CriticalStep
-    from rsfstudy.critical_steps.triggered import Triggered
+    from rsfstudy.critical_steps.triggered_instability import Triggered
     from rsfstudy.fitting.fit_measure import Fit
     from rsfstudy.limit_cycles.event_statistics import EventStatistics
     from rsfstudy.limit_cycles.limit_cycle import LimitCycle
@@ -34,7 +34,7 @@ else:
         __name__,
         {
             "critical_steps.critical_step": ("CriticalStep",),
-            "critical_steps.triggered": ("Triggered",),
+            "critical_steps.triggered_instability": ("Triggered",),
             "fitting.fit_measure": ("Fit",),
             "limit_cycles.event_statistics": ("EventStatistics",),
             "limit_cycles.limit_cycle": ("LimitCycle",),

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
         Accuracy,
         estimate_error,
     )
+    from rsfstudy.motion.deprecated_arguments import (
+        accept_deprecated_accuracy_and_meter,
+    )
     from rsfstudy.motion.engine_factory import Engine
     from rsfstudy.motion.events import (
         Event,
@@ -30,9 +33,6 @@ if TYPE_CHECKING:
         maximum,
         minimum,
         rise,
-    )
-    from rsfstudy.motion.former_arguments import (
-        accept_deprecated_accuracy_and_meter,
     )
     from rsfstudy.motion.integrator import Integrator
     from rsfstudy.motion.motion_driver import MotionDriver
@@ -68,7 +68,7 @@ else:
                 "minimum",
                 "rise",
             ),
-            "motion.former_arguments": ("accept_former_accuracy_and_meter",),
+            "motion.deprecated_arguments": ("accept_former_accuracy_and_meter",),
             "motion.integrator": ("Integrator",),
             # Former export. ``Scene`` has a method that replaces this function.
             "slider.equations": ("compute_slow_manifold_point as slow_manifold_point",),

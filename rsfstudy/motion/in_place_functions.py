@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from rsfstudy.motion.array_layout import FIRST_STATE, LOG_SLIP_RATE
-from rsfstudy.motion.steppers import unrolled_step
+from rsfstudy.motion.steppers import unrolled_runge_kutta_step
 from rsfstudy.slider import EquationsOfMotion, FloatTuple, NumericFunction
 
 
@@ -92,7 +92,7 @@ def _build_in_place_functions_cached(
         fill_motion_point=build_fill_motion_point_function(
             motion_point_function, of_unknowns, numbers, state_count
         ),
-        attempt_step=unrolled_step.build_step_attempt_function(
+        attempt_step=unrolled_runge_kutta_step.build_step_attempt_function(
             rate_function, unknown_count, numbers
         ),
         fill_force_balance=force_balance_function

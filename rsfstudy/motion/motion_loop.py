@@ -78,11 +78,6 @@ from rsfstudy.motion.regime_starts import (
     start_next_segment,
 )
 from rsfstudy.motion.regime_switching import CONTINUES, RegimeSwitchThresholds
-from rsfstudy.motion.step_ends import (
-    has_rupture_regime_ended,
-    is_step_end_valid,
-    truncate_step_at_end_of_regime_or_segment,
-)
 from rsfstudy.motion.step_events import (
     append_events_in_step,
     append_start_events,
@@ -98,6 +93,11 @@ from rsfstudy.motion.step_samples import (
     record_regime_start,
     record_step_samples,
     should_record_step,
+)
+from rsfstudy.motion.step_truncation import (
+    has_rupture_regime_ended,
+    is_step_end_valid,
+    truncate_step_at_end_of_regime_or_segment,
 )
 from rsfstudy.motion.steppers import begin_integration_of_regime
 from rsfstudy.motion.workspace import create_workspace

@@ -43,7 +43,7 @@ from rsfstudy.motion.array_operations import (
 )
 from rsfstudy.motion.in_place_functions import InPlaceFunctions
 from rsfstudy.motion.regime_switching import RegimeSwitchThresholds
-from rsfstudy.motion.steppers.unrolled_step import (
+from rsfstudy.motion.steppers.unrolled_runge_kutta_step import (
     DENSE_ROW_COUNT,
     HEADER_SIZE,
     STAGE_COUNT,

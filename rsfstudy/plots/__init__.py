@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.plots._agreement import draw_agreement
     from rsfstudy.plots._axes import (
         are_log_spaced,
         are_positive_and_span_decades,
@@ -26,18 +25,19 @@ if TYPE_CHECKING:
     from rsfstudy.plots._healing import plot_healing
     from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
     from rsfstudy.plots._motion import plot_motion
+    from rsfstudy.plots._reference_agreement import draw_agreement
     from rsfstudy.plots._style import (
         add_grey_legend_entry,
         cycle_marker,
         cycle_style,
         style_context,
     )
-    from rsfstudy.plots._text import format_number, format_slope
+    from rsfstudy.plots._text_formatting import format_number, format_slope
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "plots._agreement": ("draw_agreement",),
+            "plots._reference_agreement": ("draw_agreement",),
             "plots._axes": (
                 "are_log_spaced",
                 "are_positive_and_span_decades",
@@ -57,7 +57,7 @@ else:
                 "cycle_style",
                 "style_context",
             ),
-            "plots._text": ("format_number", "format_slope"),
+            "plots._text_formatting": ("format_number", "format_slope"),
         },
     )
 

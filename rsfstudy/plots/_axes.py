@@ -21,7 +21,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.plots._style import estimate_text_capacity_in_characters
-from rsfstudy.plots._text import (
+from rsfstudy.plots._text_formatting import (
     convert_symbols_to_mathtext,
     estimate_visible_character_count,
     find_quantity_symbol_or_name,

@@ -19,12 +19,12 @@ from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.formatting import format_count_with_noun, format_overrides
 from rsfstudy.plots import _panel
 from rsfstudy.plots._figure_choice import choose_figure_and_build_panels
-from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
-from rsfstudy.plots._size import (
+from rsfstudy.plots._figure_size import (
     compute_figure_size_in_inches,
     compute_max_header_line_characters,
     limit_panel_column_count_to_width,
 )
+from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
 from rsfstudy.plots._style import (
     add_panel_letters,
     finalize_layout,
@@ -33,7 +33,7 @@ from rsfstudy.plots._style import (
     merge_common_legends,
     style_context,
 )
-from rsfstudy.plots._text import (
+from rsfstudy.plots._text_formatting import (
     convert_symbols_to_mathtext,
     find_quantity_symbol_or_name,
     wrap_text,

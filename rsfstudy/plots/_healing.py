@@ -15,8 +15,11 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError
 from rsfstudy.fitting import Record
 from rsfstudy.plots._axes import set_log_scale
+from rsfstudy.plots._figure_size import (
+    compute_figure_size_in_inches,
+    limit_panel_column_count_to_width,
+)
 from rsfstudy.plots._image_files import NotebookFigure
-from rsfstudy.plots._size import compute_figure_size_in_inches, limit_panel_column_count_to_width
 from rsfstudy.plots._style import (
     add_legend,
     add_panel_letters,

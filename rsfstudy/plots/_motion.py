@@ -20,12 +20,12 @@ from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.plots._axes import set_log_scale
-from rsfstudy.plots._image_files import NotebookFigure
-from rsfstudy.plots._size import (
+from rsfstudy.plots._figure_size import (
     compute_figure_size_in_inches,
     compute_max_header_line_characters,
     limit_panel_column_count_to_width,
 )
+from rsfstudy.plots._image_files import NotebookFigure
 from rsfstudy.plots._style import (
     add_legend,
     add_panel_letters,
@@ -35,7 +35,7 @@ from rsfstudy.plots._style import (
     increase_figure_height_for_legends,
     style_context,
 )
-from rsfstudy.plots._text import convert_symbols_to_mathtext, wrap_text
+from rsfstudy.plots._text_formatting import convert_symbols_to_mathtext, wrap_text
 from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.slider import Scene
 from rsfstudy.storage import StoredDataset

@@ -36,7 +36,7 @@ from rsfstudy.plots._style import (
     cycle_style,
     estimate_text_capacity_in_characters,
 )
-from rsfstudy.plots._text import convert_symbols_to_mathtext, format_slope, wrap_text
+from rsfstudy.plots._text_formatting import convert_symbols_to_mathtext, format_slope, wrap_text
 from rsfstudy.status import Status
 from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity

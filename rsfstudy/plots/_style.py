@@ -29,8 +29,8 @@ from matplotlib.transforms import blended_transform_factory, offset_copy
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue, RsfStudyError, shorten_text
-from rsfstudy.plots._size import figure_width_context
-from rsfstudy.plots._text import estimate_visible_character_count, wrap_text
+from rsfstudy.plots._figure_size import figure_width_context
+from rsfstudy.plots._text_formatting import estimate_visible_character_count, wrap_text
 
 #: Default style sheet of rsfstudy.
 DEFAULT_STYLE_SHEET_PATH = Path(__file__).with_name("rsfstudy.mplstyle")

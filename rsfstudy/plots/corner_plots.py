@@ -21,9 +21,9 @@ from rsfstudy.plots._axes import (
     is_numeric_variable,
     list_primary_and_varying_variables,
 )
-from rsfstudy.plots._size import compute_figure_size_in_inches
+from rsfstudy.plots._figure_size import compute_figure_size_in_inches
 from rsfstudy.plots._style import cycle_style
-from rsfstudy.plots._text import find_quantity_symbol_or_name, format_units, wrap_text
+from rsfstudy.plots._text_formatting import find_quantity_symbol_or_name, format_units, wrap_text
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import DrawFunction, Figure, Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity

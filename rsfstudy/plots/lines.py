@@ -28,7 +28,7 @@ from rsfstudy.plots._axes import (
     set_up_x_axis_for_dimension,
 )
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
-from rsfstudy.plots._text import convert_symbols_to_mathtext
+from rsfstudy.plots._text_formatting import convert_symbols_to_mathtext
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Panel
 

@@ -35,7 +35,7 @@ from rsfstudy.plots._axes import (
     list_measured_variables,
     read_flag_meanings_of_variable,
 )
-from rsfstudy.plots._text import convert_symbols_to_mathtext, format_number
+from rsfstudy.plots._text_formatting import convert_symbols_to_mathtext, format_number
 from rsfstudy.status import Status
 from rsfstudy.study import Panel
 

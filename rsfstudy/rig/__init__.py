@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         RecordReadingOptions,
         read_columns,
     )
-    from rsfstudy.rig.columns import Column
     from rsfstudy.rig.common_headings import AcceptedRecordColumns, has_time_column
     from rsfstudy.rig.dataset_units import DatasetUnits
     from rsfstudy.rig.number_ranges import expand_range
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
         RigAxesToScenesConverter,
     )
     from rsfstudy.rig.rig_study_axes import RigAxes
+    from rsfstudy.rig.table_columns import Column
     from rsfstudy.rig.table_files import read_table
     from rsfstudy.rig.units import (
         compute_conversion_factor,
@@ -47,7 +47,7 @@ else:
             "rig.dataset_units": ("DatasetUnits",),
             "rig.rig_scenes": ("LatticeScenesOnRig",),
             # These are former exports, which ``DatasetUnits`` replaces.
-            "rig.dataset_scales": (
+            "rig.dataset_unit_scales": (
                 "convert_dataset_units",
                 "convert_to_display_units",
                 "find_scale_of_variable",
@@ -55,7 +55,7 @@ else:
                 "read_si_scales",
                 "slip_rate_from_log",
             ),
-            "rig.columns": ("Column",),
+            "rig.table_columns": ("Column",),
             "rig.column_reading": ("ColumnsReadFromSource", "ReadingOptions", "read_columns"),
             "rig.table_files": ("read_table",),
             "rig.common_headings": ("UsableColumns", "has_time_column"),

@@ -12,7 +12,6 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 from rsfstudy.errors import CallError, InvalidValue, shorten_text
-from rsfstudy.rig.columns import Column
 from rsfstudy.rig.common_headings import (
     AcceptedRecordColumns,
     check_column_values_are_finite,
@@ -21,6 +20,7 @@ from rsfstudy.rig.common_headings import (
 from rsfstudy.rig.readers import read_table_from_source
 from rsfstudy.rig.readers.table_sources import LazyTable
 from rsfstudy.rig.row_selection import RowSelection
+from rsfstudy.rig.table_columns import Column
 from rsfstudy.rig.units import (
     compute_conversion_factor,
     convert_to_si,

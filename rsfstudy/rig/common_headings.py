@@ -12,9 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSelection, parse_column_selection
 from rsfstudy.rig.readers import read_table_from_source
 from rsfstudy.rig.readers.table_sources import LazyTable
+from rsfstudy.rig.table_columns import (
+    HEADING_PATTERN,
+    Column,
+    ColumnSelection,
+    parse_column_selection,
+)
 from rsfstudy.rig.units import compute_conversion_factor
 
 #: SI units of the columns of a record, and factors from SI units to the units of `Record`.

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import xarray as xr
 
-from rsfstudy.rig import dataset_scales
-from rsfstudy.rig.dataset_scales import UnitScale
+from rsfstudy.rig import dataset_unit_scales
+from rsfstudy.rig.dataset_unit_scales import UnitScale
 
 
 class DatasetUnits:
@@ -21,14 +21,14 @@ class DatasetUnits:
     """
 
     #: Name of the dataset attribute that lists the scales after a conversion.
-    SCALES_ATTRIBUTE_NAME: ClassVar[str] = dataset_scales.NAME_OF_SCALES_ATTRIBUTE
+    SCALES_ATTRIBUTE_NAME: ClassVar[str] = dataset_unit_scales.NAME_OF_SCALES_ATTRIBUTE
     #: Units of stress, length and time in tables and figures of rigs.
-    DISPLAY_UNITS: ClassVar[Mapping[str, str]] = dataset_scales.DISPLAY_BASE_UNITS
+    DISPLAY_UNITS: ClassVar[Mapping[str, str]] = dataset_unit_scales.DISPLAY_BASE_UNITS
     #: Prefix of the name of a dimensionless field if an axis in physical units has the same name.
-    DIMENSIONLESS_PREFIX: ClassVar[str] = dataset_scales.DIMENSIONLESS_PREFIX
+    DIMENSIONLESS_PREFIX: ClassVar[str] = dataset_unit_scales.DIMENSIONLESS_PREFIX
 
     convert_to_dimensional_variable_name = staticmethod(
-        dataset_scales.convert_to_dimensional_variable_name
+        dataset_unit_scales.convert_to_dimensional_variable_name
     )
 
     def __init__(self, dataset: xr.Dataset) -> None:
@@ -58,8 +58,10 @@ class DatasetUnits:
         InvalidValue
             If a scale is missing, or if an argument contradicts the dataset.
         """
-        scales = dataset_scales.read_si_scales(self._dataset, **si_scales)
-        return dataset_scales.convert_dataset_units(self._dataset, scales, stress, length, time)
+        scales = dataset_unit_scales.read_si_scales(self._dataset, **si_scales)
+        return dataset_unit_scales.convert_dataset_units(
+            self._dataset, scales, stress, length, time
+        )
 
     def convert_to_display_units(self) -> xr.Dataset:
         """Convert the results of a rig to MPa, um and s for tables and figures.
@@ -69,7 +71,7 @@ class DatasetUnits:
         xarray.Dataset
             Results in MPa, um and s. A dataset without a rig is returned unchanged.
         """
-        return dataset_scales.convert_to_display_units(self._dataset)
+        return dataset_unit_scales.convert_to_display_units(self._dataset)
 
     def find_unit_scale_of_variable(self, variable_name: str) -> UnitScale | None:
         """Find the SI value of the dimensionless unit of a variable.
@@ -89,8 +91,8 @@ class DatasetUnits:
         InvalidValue
             If the dataset does not contain the scales of its rig.
         """
-        scales = dataset_scales.read_si_scales(self._dataset)
-        return dataset_scales.find_unit_scale_of_variable(self._dataset[variable_name], scales)
+        scales = dataset_unit_scales.read_si_scales(self._dataset)
+        return dataset_unit_scales.find_unit_scale_of_variable(self._dataset[variable_name], scales)
 
     def compute_slip_rate_from_log(
         self, variable_name: str, factor: float | xr.Variable, units: str
@@ -111,11 +113,11 @@ class DatasetUnits:
         dict of str to xarray.Variable
             Slip rate and its error estimate, by variable name.
         """
-        return dataset_scales.compute_slip_rate_from_log(
+        return dataset_unit_scales.compute_slip_rate_from_log(
             self._dataset, variable_name, factor, units
         )
 
     @property
     def has_units_other_than_display_units(self) -> bool:
         """True if the results do not have the units that study figures require."""
-        return dataset_scales.has_units_other_than_display_units(self._dataset)
+        return dataset_unit_scales.has_units_other_than_display_units(self._dataset)

@@ -16,9 +16,9 @@ from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.column_reading import RecordReadingOptions, read_columns
-from rsfstudy.rig.columns import Column
 from rsfstudy.rig.common_headings import AcceptedRecordColumns
 from rsfstudy.rig.rig import DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD, Rig
+from rsfstudy.rig.table_columns import Column
 from rsfstudy.rig.table_files import read_table
 from rsfstudy.slider import (
     MIN_SEGMENT_DURATION,

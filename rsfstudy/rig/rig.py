@@ -21,7 +21,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.rig import axes_with_units
-from rsfstudy.rig.dataset_scales import (
+from rsfstudy.rig.dataset_unit_scales import (
     UnitScale,
     compute_unit_scales_of_rig,
     convert_dataset_units,

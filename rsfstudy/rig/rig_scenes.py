@@ -15,7 +15,7 @@ import numpy as np
 from rsfstudy.axes import Axis, AxisPointFieldValues
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.axes_with_units import compute_factor_to_si, make_axis_with_units
-from rsfstudy.rig.dataset_scales import DIMENSIONLESS_PREFIX, compute_unit_scales_of_rig
+from rsfstudy.rig.dataset_unit_scales import DIMENSIONLESS_PREFIX, compute_unit_scales_of_rig
 from rsfstudy.rig.rig import Rig, convert_to_instability_norm
 from rsfstudy.rig.rig_quantities import (
     AXIS_NAME_BY_RIG_QUANTITY,

@@ -11,7 +11,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import FILTER_KINDS, LOW_PASS_ORDERS, Filter
-from rsfstudy.rig.columns import Column
+from rsfstudy.rig.table_columns import Column
 from rsfstudy.rig.units import (
     compute_conversion_factor,
     convert_to_si,

@@ -13,14 +13,14 @@ from rsfstudy._deprecation import build_getattr_for_former_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import split_heading_into_name_and_units
-from rsfstudy.rig.columns import (
+from rsfstudy.rig.readers import read_table_from_source
+from rsfstudy.rig.readers.table_sources import LazyTable
+from rsfstudy.rig.table_columns import (
     EXAMPLE_OF_TABLE_HEADER,
     Column,
     ColumnSelection,
     parse_column_selection,
 )
-from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.table_sources import LazyTable
 
 __getattr__ = build_getattr_for_former_names(__name__)
 

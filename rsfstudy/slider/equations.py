@@ -15,12 +15,12 @@ from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.motion_point import MotionPoint
-from rsfstudy.slider.parts import FloatTuple, NumericFunction
-from rsfstudy.slider.point_functions import (
+from rsfstudy.slider.motion_point_functions import (
     build_point_function_between_ruptures,
     build_point_function_in_rupture,
     build_point_function_of_rigid_slider,
 )
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
 from rsfstudy.slider.rate_functions import (
     build_rate_function_of_rigid_slider,
     build_rate_functions_between_ruptures,

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
         read_dataset,
         write_dataset,
     )
-    from rsfstudy.storage.fingerprints import find_fingerprint_differences
     from rsfstudy.storage.lattice_coordinates import LatticeCoordinatesBuilder
     from rsfstudy.storage.lattice_datasets import assemble_study_dataset
     from rsfstudy.storage.results_comparison import (
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
         compare_results,
         compare_results_of_same_study,
     )
+    from rsfstudy.storage.run_fingerprints import find_fingerprint_differences
     from rsfstudy.storage.stored_dataset import StoredDataset
     from rsfstudy.storage.stored_declarations import build_scene_from_stored_fields
     from rsfstudy.storage.zarr_store import ZarrStore
@@ -59,7 +59,7 @@ else:
             ),
             "storage.cell_journal": ("CellJournal", "CellWallTimes"),
             "storage.stored_declarations": ("build_scene_from_stored_fields",),
-            "storage.fingerprints": ("find_fingerprint_differences",),
+            "storage.run_fingerprints": ("find_fingerprint_differences",),
             "storage.lattice_coordinates": ("LatticeCoordinatesBuilder",),
             "storage.lattice_datasets": ("assemble_study_dataset",),
             "storage.dataset_files": (

@@ -31,7 +31,7 @@ from rsfstudy.storage.cell_result_arrays import (
     CellResultArrays,
     compute_journal_row_checksum,
 )
-from rsfstudy.storage.fingerprints import find_fingerprint_differences, merge_fingerprints
+from rsfstudy.storage.run_fingerprints import find_fingerprint_differences, merge_fingerprints
 
 #: Version of the journal format. Increment the version if the tables, the checksum or the
 #: definition of the cell key change.

@@ -21,7 +21,7 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.former_data_names import rename_former_declaration_fields
 from rsfstudy.status import Status
-from rsfstudy.storage.fingerprints import find_fingerprint_differences
+from rsfstudy.storage.run_fingerprints import find_fingerprint_differences
 from rsfstudy.storage.schema import is_of_single_scene, read_provenance
 from rsfstudy.storage.study_reconstruction import find_primary_output_name
 from rsfstudy.vocabulary import TIMING_VARIABLES

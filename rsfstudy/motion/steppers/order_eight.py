@@ -14,7 +14,7 @@ from scipy.integrate import DOP853
 from rsfstudy.motion.array_operations import advance_pointer_by_items, evaluate_function_into_array
 from rsfstudy.motion.max_step_length import MAX_STEP_LENGTH
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
-from rsfstudy.motion.steppers.unrolled_step import (
+from rsfstudy.motion.steppers.unrolled_runge_kutta_step import (
     DENSE_ROW_COUNT,
     ERROR_INDEX,
     EXTRA_STAGE_COUNT,

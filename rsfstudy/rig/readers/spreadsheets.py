@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
 from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
 from rsfstudy.rig.readers.text_layout import detect_text_layout
+from rsfstudy.rig.table_columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.units import parse_number
 
 _ZIP_SIGNATURE, _OLE_SIGNATURE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"

@@ -16,7 +16,12 @@ import numpy as np
 
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSelection, check_heading_lengths
+from rsfstudy.rig.table_columns import (
+    HEADING_PATTERN,
+    Column,
+    ColumnSelection,
+    check_heading_lengths,
+)
 from rsfstudy.rig.units import find_si_factor_and_exponents
 
 #: Number of bytes at the beginning of a file that are used to recognise the format.

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
 from rsfstudy.rig.readers.text_layout import (
     COMMENT_LINE_PREFIXES,
@@ -21,6 +20,7 @@ from rsfstudy.rig.readers.text_layout import (
     detect_text_layout,
     is_line_without_data,
 )
+from rsfstudy.rig.table_columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.units import parse_number
 
 #: Characters of tables that pandas can parse.

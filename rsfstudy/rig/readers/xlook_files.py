@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rsfstudy.errors import DataError
-from rsfstudy.rig.columns import Column
 from rsfstudy.rig.readers.table_sources import LazyTable, TableSource, append_units_to_headings
+from rsfstudy.rig.table_columns import Column
 
 #: Layout of xlook files. The constants are the size of the file header in bytes, the size of each
 #: column header in bytes, and the number of column headers. The data of an xlook file follow the

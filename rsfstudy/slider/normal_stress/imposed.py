@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.normal_stress._state_effect import NormalStressWithStateEffect
+from rsfstudy.slider.normal_stress._effect_on_state import NormalStressWithStateEffect
 from rsfstudy.slider.parameter_layout import IMPOSED_NORMAL_STRESS
 from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView

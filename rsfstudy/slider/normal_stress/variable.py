@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.normal_stress._state_effect import NormalStressWithStateEffect
+from rsfstudy.slider.normal_stress._effect_on_state import NormalStressWithStateEffect
 from rsfstudy.slider.parameter_layout import (
     IMPOSED_NORMAL_STRESS,
     LARGEST_NORMAL_STRESS_EXCESS,

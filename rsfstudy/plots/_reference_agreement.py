@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 
 from rsfstudy._deprecation import accept_former_keyword_names
+from rsfstudy.plots._figure_size import compute_figure_size_in_inches
 from rsfstudy.plots._image_files import NotebookFigure
-from rsfstudy.plots._size import compute_figure_size_in_inches
 from rsfstudy.plots._style import (
     add_legend,
     cycle_marker,
