@@ -10,7 +10,7 @@ The former names will be removed in version 1.0.0. The dictionary
 ``"package.module:Class"``
     Members of a class with the decorator ``add_former_member_names``. If users may override the
     members in a subclass, the method ``__init_subclass__`` of the class calls
-    ``add_new_names_for_former_members``.
+    ``add_new_names_for_former_overrides``.
 ``"package.module:function()"``, ``"package.module:Class()"``
     Keyword arguments of a function or of a constructor. The outermost decorator of the function or
     class is ``accept_former_keyword_names``.
@@ -624,7 +624,7 @@ def add_former_member_names(
     ----------
     owner_class : type
         Class with renamed members. The class is modified in place.
-    writable : bool, default: False
+    allow_assignment : bool, default: False
         If True, values can also be assigned under the former names.
 
     Returns

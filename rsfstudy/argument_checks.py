@@ -84,7 +84,7 @@ def find_string_instead_of_list_error(
         Function that failed.
     arguments : mapping of str to object
         Arguments of the function, as in ``inspect.BoundArguments``.
-    error : Exception
+    raised_exception : Exception
         Exception that the function raised.
 
     Returns
@@ -143,7 +143,7 @@ def find_unusable_value_error(
     ----------
     arguments : mapping of str to object
         Values by argument name.
-    error : Exception
+    raised_exception : Exception
         Exception that the function raised.
     remedy : str
         Last sentence of the error message.

@@ -51,7 +51,7 @@ def error_boundary(
     ----------
     function : callable
         A public function or method.
-    is_called_internally : bool, default: False
+    applies_to_internal_calls : bool, default: False
         If True, the error boundary also converts exceptions in calls from within rsfstudy.
     unchanged_exceptions : tuple of type, optional
         Exceptions that are not converted. The defaults are errors of rsfstudy, warnings, and the

@@ -20,7 +20,7 @@ def read_flag_meanings(variable_attributes: Mapping[str, Any]) -> dict[float, st
 
     Parameters
     ----------
-    attributes : mapping of str to object
+    variable_attributes : mapping of str to object
         Attributes of a variable.
 
     Returns

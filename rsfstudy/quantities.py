@@ -201,7 +201,7 @@ def read_units_or_reference_scale(variable_attributes: Mapping[Any, Any]) -> str
 
     Parameters
     ----------
-    attributes : mapping
+    variable_attributes : mapping
         Attributes of the variable.
 
     Returns

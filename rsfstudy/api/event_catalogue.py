@@ -395,9 +395,12 @@ def _warn_if_large_stress_fall_undetected(detection: Detection) -> str:
     ):
         return ""
     text = (
-        f"no drop was detected, although stress decreases by {detection.max_moving_average_decrease:.4g} in "
-        f"total, which is {detection.max_moving_average_decrease / detection.min_detectable_drop:.0f} times the "
-        f"smallest detectable drop ({detection.min_detectable_drop:.4g}). The decrease is too slow or "
+        "no drop was detected, although stress decreases by "
+        f"{detection.max_moving_average_decrease:.4g} in "
+        "total, which is "
+        f"{detection.max_moving_average_decrease / detection.min_detectable_drop:.0f} times the "
+        f"smallest detectable drop ({detection.min_detectable_drop:.4g}). The decrease "
+        "is too slow or "
         "lasts for most of the record"
     )
     remedy = "Select a part of the record, or pass sign=-1 if the shear stress is negative"

@@ -299,7 +299,7 @@ class InterpolatedMotionRows:
             Row next to the maximum or minimum.
         column : int
             Column of the values.
-        sign : {1.0, -1.0}
+        extremum_sign : {1.0, -1.0}
             1 for a maximum and -1 for a minimum.
 
         Returns

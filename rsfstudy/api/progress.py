@@ -38,9 +38,9 @@ def show_progress(
     is_shown_or_callback : bool or callable
         If False, nothing is displayed. If a function, the function receives the number of
         completed items, the number of all items and the remaining time in s instead.
-    items : str, default: "cells"
+    item_name : str, default: "cells"
         Name of the counted objects.
-    delay : float, default: 0.0
+    delay_seconds : float, default: 0.0
         Time in s before the first output. Nothing is displayed if the run ends earlier.
 
     Yields
@@ -107,7 +107,8 @@ def _make_progress_line_printer(
         ):
             said, told = now, part
             print_line(
-                f"{done:,} of {total:,} {item_name} after {now - began:.0f} s{left * (done < total)}"
+                f"{done:,} of {total:,} {item_name} after {now - began:.0f} "
+                f"s{left * (done < total)}"
             )
 
     return update
@@ -125,7 +126,7 @@ def compile_equations_with_notice(
     ----------
     example_scenes : sequence of Scene
         Scenes whose equations are compiled. Scenes with the same parts share their equations.
-    with_time_variable_flags : sequence of bool
+    includes_time_flags : sequence of bool
         Variants of the equations to compile. True selects the equations with time as a variable.
     is_notice_shown : bool
         If False, nothing is displayed.

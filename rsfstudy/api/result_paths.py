@@ -44,7 +44,7 @@ def find_results_file(study_or_file: str | Path, output_directory: str | Path | 
         Path of a results file (``.nc`` or ``.zarr``), name of a study, or path of a Python file
         that declares a study. If a Python file is passed, the function executes the file to obtain
         the name of the study.
-    output_path : str, Path or None
+    output_directory : str, Path or None
         Directory that contains the results. If None, the default output directory is used.
 
     Returns

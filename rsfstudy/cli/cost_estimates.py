@@ -39,11 +39,11 @@ class StudyCostEstimate:
     ----------
     rhs_evaluations : int
         Expected number of right-hand-side evaluations, rounded to two significant digits.
-    seconds : float
+    estimated_seconds : float
         Estimated computing time in s.
     cell_count : int
         Number of distinct cells of the study.
-    measured_cell_count : int
+    timed_cell_count_in_study : int
         Number of cells of the study with a measured computing time.
     timed_cell_count_in_journal : int
         Number of all cells with a measured computing time in the journal. If this number is 0, the

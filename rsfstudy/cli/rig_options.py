@@ -52,7 +52,7 @@ def describe_rig_option(option_name: str) -> str:
 
     Parameters
     ----------
-    name : str
+    option_name : str
         Name of the quantity of the rig.
 
     Returns

@@ -64,7 +64,7 @@ class CriticalPath(NamedTuple):
     ----------
     log_slip_rate_at_instability_norm : float
         Value of ln(V/V_*) at the instability norm.
-    frictional_stress_at_zero_normal_stress : float
+    min_frictional_stress : float
         Frictional stress at which the normal stress vanishes, in units of sigma_*.
     radiated_stress_at_instability_norm : float
         Stress that seismic waves radiate at the instability norm, in units of sigma_*.
@@ -415,7 +415,7 @@ def build_motion_point_evaluator(
     ----------
     rate_function : callable
         Function ``(state, p) -> rates`` that evaluates the derivatives of the unknowns.
-    point_function : callable
+    motion_point_function : callable
         Function ``(state, rates, p) -> MotionPoint``.
 
     Returns

@@ -1,8 +1,8 @@
 """Boundary between stable and unstable step sizes, with its numerical error.
 
-The function ``find_critical_size_by_critical_path`` computes the boundary from the critical path.
-The function ``find_critical_size_by_limit_cycle`` computes the step size at which a limit cycle
-touches the instability norm.
+The function ``find_critical_step_size_by_critical_path`` computes the boundary from the critical
+path. The function ``find_critical_step_size_by_limit_cycle`` computes the step size at which a
+limit cycle touches the instability norm.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ class CriticalStepSizeEstimate:
         Size of the step. See ``LoadingStepFamily``.
     relative_error : float
         Relative error of the step size.
-    found_from_forward_motions : bool, default: False
+    uses_forward_integration : bool, default: False
         True if the boundary was computed from motions that are integrated forwards in time.
-    found_from_limit_cycle : bool, default: False
+    limit_cycle_touches_instability_norm : bool, default: False
         True if a limit cycle touches the instability norm at the boundary.
     """
 

@@ -97,6 +97,7 @@ def build_slow_instability_norm_warning(scene: Scene, load_velocity: float) -> s
         f"{SLOW_INSTABILITY_NORM_WARNING_PREFIX}{scene.instability_norm:g} corresponds to a slip "
         f"rate of {rate:.3g} V_*, which is only {rate / load:.3g} times the load point velocity. "
         "A motion that reaches this slip rate may be stable. Use a slip rate above "
-        f"{_MIN_INSTABILITY_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*. For a rig, pass the slip rate with "
+        f"{_MIN_INSTABILITY_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*. For a rig, pass "
+        "the slip rate with "
         "units, for example rig.scene(instability_norm='10 mm/s')"
     )

@@ -344,7 +344,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
         step. An approximate root of the misfit, and the slope of the misfit at the root, are
         computed first with a loose tolerance. One to three paths are then integrated for each
         smaller tolerance. If the scene has several states, there are no critical paths. See
-        ``LoadingStepFamily.iterate_sizes_by_critical_path``.
+        ``LoadingStepFamily.iterate_step_sizes_by_critical_path``.
         """
         path_at = self.build_critical_path_factory(integrator)
         loose = (
@@ -383,7 +383,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
 
         The method searches for the smallest step after which an orbit that touches the instability
         norm does not shrink. The computation of each misfit requires the integration of one orbit.
-        See ``LoadingStepFamily.iterate_sizes_by_limit_cycle``.
+        See ``LoadingStepFamily.iterate_step_sizes_by_limit_cycle``.
         """
         found, path_at = dict[float, float](), self.build_critical_path_factory(integrator)
 

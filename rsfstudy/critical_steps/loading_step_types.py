@@ -159,7 +159,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         If the scene has inertia, the slider follows the critical path with a delay, which changes
         the critical step size in two ways. The load point moves during the delay, and the state
         evolves less because the slip rate is lower. The effect on the state is b/2 times the slip
-        by which the slider is delayed. See ``LoadingStepFamily.inertia_shifts_critical_size``.
+        by which the slider is delayed. See ``LoadingStepFamily.inertia_shifts_critical_step_size``.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -208,7 +208,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         A displacement step changes only the spring stress, and the state Psi remains zero. The
         critical step therefore follows from the point of the critical path at which Psi is zero,
         and each tolerance needs only one integration. See
-        ``LoadingStepFamily.iterate_sizes_by_critical_path``.
+        ``LoadingStepFamily.iterate_step_sizes_by_critical_path``.
         """
         path, sign = CriticalPath.from_scene(self.scene, integrator), self.sign
         for tolerance in local_tolerances:
@@ -286,7 +286,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
 
         If the scene has inertia, the slip rate rises with a delay after the step. The effect of
         inertia on the critical step size depends on the slip rate immediately after the step. See
-        ``LoadingStepFamily.inertia_shifts_critical_size``.
+        ``LoadingStepFamily.inertia_shifts_critical_step_size``.
         """
         scene = self.scene
         behind = (

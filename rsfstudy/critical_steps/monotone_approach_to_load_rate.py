@@ -69,7 +69,7 @@ def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]
     -------
     list of EventSpecification
         Events at which ln V rises through levels below ln V_0. The function
-        ``rises_monotonically_to_load_rate`` tests the motion at these events. The list of events is
+        ``is_slip_rate_rise_monotone`` tests the motion at these events. The list of events is
         empty if the slip rate rises quickly. The list is also empty if the scene has several states
         or inertia, because the test is not valid for such scenes.
     """
@@ -93,7 +93,7 @@ def is_slip_rate_rise_monotone(scene: Scene, motion_point: MotionPoint) -> bool:
     ----------
     scene : Scene
         Scene of the motion.
-    point : MotionPoint
+    motion_point : MotionPoint
         Present point of the motion.
 
     Returns

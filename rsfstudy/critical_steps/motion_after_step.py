@@ -1,7 +1,7 @@
 """Motion after a step, and its peak slip rate relative to the instability norm.
 
 The main functions are ``motion_reaches_instability_norm`` and
-``compute_log_rate_excess_over_norm``.
+``compute_log_rate_above_instability_norm``.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def motion_reaches_instability_norm(scene: Scene, integrator: Integrator) -> boo
     Returns
     -------
     bool
-        True if ``compute_log_rate_excess_over_norm`` is not negative.
+        True if ``compute_log_rate_above_instability_norm`` is not negative.
     """
     return compute_log_rate_above_instability_norm(scene, integrator) >= 0.0
 

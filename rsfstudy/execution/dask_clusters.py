@@ -118,7 +118,7 @@ def _wrap_resource_tracker_unregister(unregister: Callable[..., None]) -> Any:
 
 
 def _tolerate_lost_resource_tracker() -> None:
-    """Install ``_wrap_unregister_for_unknown_names`` until the process ends.
+    """Install ``_wrap_resource_tracker_unregister`` until the process ends.
 
     The wrapper must stay installed, because semaphores are released whenever they are
     garbage-collected.

@@ -136,7 +136,7 @@ class BackgroundJobRunner:
             Function that receives the result, in the thread of the page.
         on_error : callable
             Function that receives an exception of the computation, in the thread of the page.
-        label : str, optional
+        progress_label : str, optional
             Text next to the progress bar.
         """
         job = _BackgroundJob(progress_label, compute, on_result, on_error, pn.state.curdoc)

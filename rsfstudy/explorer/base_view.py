@@ -42,8 +42,8 @@ class ExplorerView(ABC):
     """Base class that adds code, downloads and messages to the widgets of a view.
 
     A subclass creates its widgets in ``__init__``, and implements the abstract methods. The
-    subclass calls ``update_code_and_url`` after each change to its widgets. To handle errors of
-    computations, the subclass calls ``show_error`` or uses the context manager
+    subclass calls ``update_displayed_code_and_url`` after each change to its widgets. To handle
+    errors of computations, the subclass calls ``show_error`` or uses the context manager
     ``show_raised_errors``. The methods ``draw_figure_for_download``, ``build_table_for_download``
     and ``build_dataset_for_download`` are called when the user downloads a file.
 

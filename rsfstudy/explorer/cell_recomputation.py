@@ -48,7 +48,7 @@ class RecomputedCell:
         Motion of the cell.
     motion_explanation : str
         Explanation of the motion.
-    motion_code : str
+    motion_python_code : str
         Python statement that computes the motion.
     """
 

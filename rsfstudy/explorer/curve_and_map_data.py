@@ -33,7 +33,7 @@ class CurveData:
     ----------
     label : str
         Point of the curve on the colour dimension. The string is empty for a single curve.
-    point_index : int
+    colour_point_index : int
         Index of this point.
     x, y, y_error : ndarray
         Coordinates, values and error estimates. If the variable has no error estimate, ``y_error``

@@ -306,9 +306,9 @@ def format_fit_command(record_path: str, fit_arguments: Mapping[str, Any]) -> st
 
     Parameters
     ----------
-    path : str
+    record_path : str
         Path of the record.
-    arguments : mapping of str to object
+    fit_arguments : mapping of str to object
         Arguments of ``rsfstudy.read_record`` and ``rsfstudy.fit``.
 
     Returns

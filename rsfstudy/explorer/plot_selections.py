@@ -1,7 +1,7 @@
 """Selections of the results of a study.
 
 A selection consists of a variable, the dimensions along the axes of the plot, and one point of each
-remaining dimension. The function ``complete_selection`` completes and checks a selection.
+remaining dimension. The function ``complete_plot_selection`` completes and checks a selection.
 """
 
 from __future__ import annotations

@@ -360,14 +360,14 @@ class ResultsView(ExplorerView):
     def format_equivalent_python_code(self) -> str:
         """Return code that prints the numbers of the plot.
 
-        See ``ExplorerView.write_python_code``.
+        See ``ExplorerView.format_equivalent_python_code``.
         """
         return format_selection_as_python_code(
             self.shown, self.selection, self.file, self.cell, self._find_chosen_cell_coordinates()
         )
 
     def format_equivalent_command_line(self) -> str:
-        """Return commands that export the results. See ``ExplorerView.write_command_line``."""
+        """Return commands that export the results. See ``ExplorerView.format_equivalent_command_line``."""
         return format_selection_as_shell_commands(
             self.selection, self.file, self.widget_state_json, self._find_chosen_cell_coordinates()
         )

@@ -122,7 +122,7 @@ class SceneControls:
 
         Parameters
         ----------
-        slot : PartSlot
+        part_slot : PartSlot
             Slot of a scene.
 
         Returns

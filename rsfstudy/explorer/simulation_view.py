@@ -50,11 +50,11 @@ class ComputedMotion(NamedTuple):
         Rig of the scene.
     scene : Scene
         Scene of the motion.
-    motion : xarray.Dataset
+    dimensionless_motion : xarray.Dataset
         Dimensionless motion.
-    displayed_motion : xarray.Dataset
+    motion_in_display_units : xarray.Dataset
         Motion in the units of the page.
-    tables_and_sentences : list
+    summary_tables_and_sentences : list
         Tables and sentences about the motion.
     """
 

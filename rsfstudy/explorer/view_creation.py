@@ -37,7 +37,7 @@ def create_view(source: Any = None, state_json: str | None = None) -> ExplorerVi
     ----------
     source : Scene, Rig, Record, xarray.Dataset or path, optional
         Object to show. The default is a scene with the default values.
-    state : str, optional
+    state_json : str, optional
         Settings of the widgets as JSON.
 
     Returns

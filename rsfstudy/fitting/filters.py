@@ -134,8 +134,8 @@ class Filter:
         ----------
         time : ndarray, shape (rows,)
             Times of the rows in s.
-        samples : ndarray, shape (samples,)
-            Unfiltered friction at ``sample_times(time)``.
+        unfiltered_samples : ndarray, shape (samples,)
+            Unfiltered friction at ``compute_required_sample_times(time)``.
 
         Returns
         -------
@@ -193,7 +193,7 @@ class Filter:
         ----------
         time : ndarray, shape (rows,)
             Times of the rows in s, in increasing order.
-        values : ndarray, shape (rows,)
+        recorded_values : ndarray, shape (rows,)
             Recorded values. The function interpolates linearly between the rows.
 
         Returns

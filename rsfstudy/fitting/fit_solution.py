@@ -52,7 +52,7 @@ class FitSolution:
         Whitened residuals divided by their standard deviation.
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the fitted friction with respect to the parameter coordinates.
-    loading_error_sensitivity : ndarray, shape (rows, errors)
+    friction_change_by_loading_error : ndarray, shape (rows, errors)
         Change in friction due to each independent error of the step times and step velocities. The
         size of each error is one standard deviation.
     aic : float

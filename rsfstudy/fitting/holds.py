@@ -106,11 +106,11 @@ class HoldQuantityEstimate(NamedTuple):
     ----------
     value : float
         Value of the quantity.
-    coefficient_weights : ndarray, shape (parameters,)
+    derivatives_by_coefficient : ndarray, shape (parameters,)
         Derivatives of the quantity with respect to the coefficients.
     additional_variance : float, default: 0.0
         Additional variance of the quantity, which does not depend on the coefficients.
-    trend_derivative : float, default: 0.0
+    derivative_by_friction_trend : float, default: 0.0
         Derivative of the quantity with respect to the trend.
     """
 

@@ -228,7 +228,7 @@ class JointModel:
 
         Parameters
         ----------
-        step_time_name : str
+        step_time_parameter_name : str
             Name of the step time, with or without a window number.
 
         Returns

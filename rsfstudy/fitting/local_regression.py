@@ -85,7 +85,7 @@ def fit_linear_model(
         Values to fit.
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the model with respect to the coefficients.
-    noise_by_moments : bool, default: False
+    estimate_noise_by_moments : bool, default: False
         If True, the noise is estimated by the method of moments.
 
     Returns

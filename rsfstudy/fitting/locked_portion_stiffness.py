@@ -154,7 +154,8 @@ def _build_stiffness_table(
     """Build a table of the locked portions and the mean stiffness.
 
     Each row contains the kind, begin, end, stiffness, standard error and normal stress of a
-    portion. ``trend_caused_error`` is the error of all stiffnesses due to the trend of friction.
+    portion. ``stiffness_error_from_trend`` is the error of all stiffnesses due to the trend of
+    friction.
     """
     begins, ends, values, errors, stresses = (
         np.array([row[1:] for row in portion_rows], dtype=float).reshape(-1, 5).T

@@ -108,7 +108,7 @@ class NoiseModel:
 
     Parameters
     ----------
-    sampling_runs : tuple of SamplingRun
+    uniform_sampling_runs : tuple of SamplingRun
         Runs of consecutive rows with the same noise process and noise level.
     partial_autocorrelations : ndarray, shape (processes, order)
         Partial autocorrelations of each autoregressive process.

@@ -88,9 +88,9 @@ class Detection(NamedTuple):
         Detected drops in order of time.
     noise_sd : float
         Standard deviation of the noise.
-    detectable_drop : float
+    min_detectable_drop : float
         Smallest detectable drop. A drop of this size is missed with a probability of 0.001.
-    max_decrease : float
+    max_moving_average_decrease : float
         Largest decrease in the moving average of stress.
 
     Examples

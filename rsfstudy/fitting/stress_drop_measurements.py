@@ -57,7 +57,7 @@ class DropMeasurements(NamedTuple):
 
     Parameters
     ----------
-    event_rows : list of EventNumbers
+    quantities_of_each_drop : list of EventNumbers
         Properties of each drop.
     detection : Detection
         Result of the detection.

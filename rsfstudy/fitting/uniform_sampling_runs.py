@@ -90,7 +90,7 @@ def split_runs_at_noise_level_changes(
 
     Parameters
     ----------
-    runs : sequence of SamplingRun
+    sampling_runs : sequence of SamplingRun
         Runs that cover all rows.
     change_rows : sequence of int
         Rows at which the noise level changes. Changes close to the ends of a run are ignored.
@@ -130,7 +130,7 @@ def count_noise_processes(sampling_runs: Sequence[UniformSamplingRun]) -> int:
 
     Parameters
     ----------
-    runs : sequence of SamplingRun
+    sampling_runs : sequence of SamplingRun
         Runs that cover all rows.
 
     Returns
@@ -148,7 +148,7 @@ def expand_run_field_to_rows(
 
     Parameters
     ----------
-    runs : sequence of SamplingRun
+    sampling_runs : sequence of SamplingRun
         Runs that cover all rows.
     run_field_name : {"process", "level"}
         Name of the index to return: the index of the noise process, or of the noise level.

@@ -78,7 +78,7 @@ class PeriodicOrbit:
         Derivatives of each cycle, of shape (1 + states + results, 1 + states). Rows correspond to
         the spring stress and the states at the end of the cycle, and to the main results. Columns
         correspond to the spring stress and the states at the beginning of the cycle.
-    start_section_correction : ndarray, shape (1 + states,)
+    offset_to_closed_orbit : ndarray, shape (1 + states,)
         Vector from the section at which the computed cycles begin to the corresponding section of
         the closed orbit.
     integration_accuracy : Accuracy
@@ -397,7 +397,7 @@ class ReturnMap:
 
         Parameters
         ----------
-        point : MotionPoint
+        motion_point : MotionPoint
             Point of the motion at the section.
 
         Returns

@@ -188,7 +188,7 @@ def suggest_raising_event_limit(event_limit: int, option_name: str = "events") -
 
     Parameters
     ----------
-    event_count : int
+    event_limit : int
         Present limit of the number of events.
     option_name : str, default: "events"
         Name of the field that holds the limit.
@@ -219,7 +219,7 @@ def extract_recorded_rows_of_cycles(
     Returns
     -------
     ndarray, shape (n, columns)
-        Recorded samples. The columns are documented in ``Recording.as_table``.
+        Recorded samples. The columns are documented in ``MotionRecorder.as_table``.
 
     Notes
     -----

@@ -3,8 +3,8 @@
 ``Accuracy`` defines the tolerances, the work budget and the engine. An ``Integrator`` integrates
 scenes to the requested accuracy and counts right-hand side evaluations. The method
 ``Integrator.follow`` integrates a scene through its loading segments and regimes, and yields
-events. A ``Recording`` also stores the samples of the motion. To read the implementation, start
-with ``integrator``, followed by ``motion_driver`` and ``motion_loop``. The engines are SciPy,
+events. A ``MotionRecorder`` also stores the samples of the motion. To read the implementation,
+start with ``integrator``, followed by ``motion_driver`` and ``motion_loop``. The engines are SciPy,
 Python and the compiled engine. The package only integrates motions, and never computes results from
 a motion. The measures in ``rsfstudy.measures`` compute the results.
 """

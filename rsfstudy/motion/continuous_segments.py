@@ -155,7 +155,7 @@ def iterate_segment_start_events(
 
     Parameters
     ----------
-    event : Event
+    segment_entry_event : Event
         Event at which the motion enters the chain.
     point_and_parameters_before : tuple of (MotionPoint, tuple of float)
         Last point and last parameters of the previous chain.

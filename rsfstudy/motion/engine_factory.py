@@ -27,7 +27,7 @@ def check_engine_is_usable(engine_name: str) -> None:
 
     Parameters
     ----------
-    name : str
+    engine_name : str
         Name of the engine.
 
     Raises

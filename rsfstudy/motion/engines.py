@@ -140,7 +140,7 @@ class CompilationLog:
         Number of compiled programs.
     total_compilation_seconds : float, default: 0.0
         Total compilation time in seconds.
-    create_compilation_context : callable, optional
+    compilation_context_factory : callable, optional
         Function that returns a context manager for the compilation. A time limit or a timer can use
         the context manager to exclude the compilation time. By default, the context manager does
         nothing.

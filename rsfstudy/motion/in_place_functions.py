@@ -29,7 +29,7 @@ class InPlaceFunctions(NamedTuple):
     ----------
     fill_rates : callable
         Function that fills in the derivatives of the unknowns.
-    fill_point : callable
+    fill_motion_point : callable
         Function that fills an array with the values of a point of the motion.
     attempt_step : callable
         Function that attempts one step. See ``steppers.unrolled_step``.
@@ -147,7 +147,7 @@ def build_fill_motion_point_function(
 
     Parameters
     ----------
-    point_function : callable
+    motion_point_function : callable
         Function that returns a ``MotionPoint`` for the unknowns and their derivatives.
     unpack_unknowns, unpack_parameters : callable
         Functions that convert arrays to tuples.

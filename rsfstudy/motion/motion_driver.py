@@ -168,7 +168,7 @@ class MotionDriver:
             an additional limit.
         recording : Recording, optional
             Object that receives the recorded rows.
-        kinks_and_reported_count : tuple of (ndarray, int), optional
+        later_segments_and_reported_count : tuple of (ndarray, int), optional
             Segment table rows of all loading segments after the first, and a number ``n``. The
             starts of the last ``n`` segments are reported as events.
         initial_imposed_stress : float, optional
@@ -176,7 +176,7 @@ class MotionDriver:
             stress is the last unknown minus its initial value. The unknown ``spring_stress`` does
             not include the imposed shear stress. The spring stress in events and recordings
             includes the imposed shear stress.
-        further_kinks : iterator of ndarray, optional
+        noise_segment_tables : iterator of ndarray, optional
             Further rows of the segment table in a scene with noise. The driver requests them when
             the motion reaches the last row.
 
@@ -315,7 +315,7 @@ def get_motion_driver(
         Name of the engine.
     methods : tuple of (str, str)
         Pairs of a regime name and the name of the SciPy solver for this regime.
-    with_time : bool
+    include_time_equation : bool
         If True, time is one of the unknowns.
 
     Returns

@@ -135,7 +135,7 @@ def advance_motion(
         before the last kink.
     event_specs : array of shape (specifications * 7,)
         Event specifications. The columns are ``array_layout.EVENT_SPECIFICATION_COLUMNS``.
-    kinks : array of shape (segments, 6)
+    later_segments : array of shape (segments, 6)
         Segment table rows of all loading segments after the first.
     requested_samples : array
         Times or slips at which to record the motion.

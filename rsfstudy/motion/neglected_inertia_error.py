@@ -53,7 +53,7 @@ def estimate_neglected_inertia_error(
     scene : Scene
         Scene of the motion.
     recorded_rows : ndarray
-        Rows of a recording, from ``Recording.as_table``.
+        Rows of a recording, from ``MotionRecorder.as_table``.
     slow_regime_number : int
         Index of the slow-manifold regime in ``recorded_rows``.
     initial_log_slip_rate : float

@@ -1,8 +1,8 @@
 """Recording of a motion as a table of samples.
 
-The event loop fills blocks of rows, which ``motion_driver`` appends to a ``Recording``.
-``Recording.as_table`` converts the blocks to a table. ``resample_along_path`` reduces the table to
-a fixed number of points for plots and files.
+The event loop fills blocks of rows, which ``motion_driver`` appends to a ``MotionRecorder``.
+``MotionRecorder.as_table`` converts the blocks to a table. ``resample_along_path`` reduces the
+table to a fixed number of points for plots and files.
 """
 
 from __future__ import annotations
@@ -187,7 +187,7 @@ class MotionRecorder:
     def convert_point_to_row(
         scene: Scene, time: float, slip: float, point: MotionPoint, regime_index: int
     ) -> np.ndarray:
-        """Convert a point of the motion to a row of ``Recording.as_table``.
+        """Convert a point of the motion to a row of ``MotionRecorder.as_table``.
 
         Parameters
         ----------
@@ -429,7 +429,7 @@ def move_nearest_row_position_to(row_positions: Any, target_position: float) -> 
     ----------
     row_positions : array
         Increasing row positions. The first and last positions are never replaced.
-    row_position : float
+    target_position : float
         Row position to insert.
     """
     nearest = 1

@@ -50,7 +50,7 @@ def start_next_segment(motion, workspace, last_point, later_segments, recording_
         Arrays of the regime at the end of the previous segment.
     last_point : array of shape (FIRST_STATE + states,)
         Output array for the last point of the previous segment.
-    kinks : array of shape (segments, 6)
+    later_segments : array of shape (segments, 6)
         Segment table rows of all loading segments after the first.
     recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
         Output table of recorded samples.

@@ -47,7 +47,7 @@ class RegimeSwitchThresholds(NamedTuple):
     ----------
     max_slip_rate_norm : float
         Maximum slip rate norm :math:`w` on the slow manifold.
-    max_log_rate_change_by_inertia : float
+    max_log_slip_rate_change_by_inertia : float
         Maximum change in ln V due to inertia on the slow manifold.
     max_slip_in_return_to_slow_manifold : float
         Maximum slip during a transition to the slow manifold, in D_c.

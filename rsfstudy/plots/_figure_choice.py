@@ -41,7 +41,7 @@ def choose_figure_and_build_panels(
     ----------
     dataset : xarray.Dataset
         Results of a study.
-    user_figure : callable, module, Figure or str, optional
+    requested_figure : callable, module, Figure or str, optional
         User-defined figure, as for ``draw_figure``.
     variable : str, optional
         Name of a variable to draw instead of the declared figure.

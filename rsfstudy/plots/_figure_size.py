@@ -81,10 +81,10 @@ def compute_figure_size_in_inches(
 
     Parameters
     ----------
-    panel_columns : int
+    panel_column_count : int
         Number of columns of panels. If no width is requested, a figure with one column of panels is
         as wide as a column of a journal page, and all other figures are as wide as the page.
-    panel_rows : int
+    panel_row_count : int
         Number of rows of panels.
     panel_height_mm : float, optional
         Height of a panel in mm. The default is the figure height of the current style.
@@ -110,13 +110,13 @@ def limit_panel_column_count_to_width(panel_column_count: int) -> int:
 
     Parameters
     ----------
-    panel_columns : int
+    panel_column_count : int
         Number of panel columns if no width is requested.
 
     Returns
     -------
     int
-        Number of columns, at most ``panel_columns``.
+        Number of columns, at most ``panel_column_count``.
     """
     width = _requested_figure_width_mm.get()
     if width is None:

@@ -284,7 +284,7 @@ def add_legend(axes: Axes, legend_column_count: int = 2, title: str | None = Non
     ----------
     axes : matplotlib.axes.Axes
         Axes that the legend describes.
-    legend_columns : int, default: 2
+    legend_column_count : int, default: 2
         Maximum number of columns of the legend. Fewer columns are used if the legend would be wider
         than the panel.
     title : str, optional

@@ -1,6 +1,6 @@
 """Line plots of the variables of any study.
 
-The function ``build_panels_of_figure`` builds one panel per variable. Each panel shows the variable
+The function ``build_line_panels`` builds one panel per variable. Each panel shows the variable
 against one axis of the study, with one line for each point of the other axes.
 """
 

@@ -1,6 +1,6 @@
 """Maps of a variable as a function of two numeric axes.
 
-The function ``build_panels_of_figure`` builds one map for each point of the other axes of the
+The function ``build_map_panels`` builds one map for each point of the other axes of the
 study. A map shows the variable as colours with labelled contours. Lattice cells without a value are
 hatched according to their status. The module ``_figures`` chooses between maps, lines and scatter
 matrices.
@@ -201,7 +201,7 @@ def draw_contours(axes: Axes, map_values: xr.DataArray, contour_levels: Sequence
     ----------
     axes : matplotlib.axes.Axes
         Axes to draw on.
-    values : xarray.DataArray, shape (ny, nx)
+    map_values : xarray.DataArray, shape (ny, nx)
         Values of the variable, with coordinates for both dimensions.
     contour_levels : sequence of float
         Values of the variable at the contours.

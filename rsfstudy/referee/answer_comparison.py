@@ -270,7 +270,7 @@ def round_digit_count_down(digit_count: float) -> float:
 
     Parameters
     ----------
-    digits : float
+    digit_count : float
         Number of digits.
 
     Returns

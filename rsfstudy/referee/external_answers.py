@@ -86,7 +86,8 @@ def read_external_answer(
     )
     if count != len(rows):
         remedy = (
-            f"Write one row for each {problem.answer_index_column_name} of the problem. Rows are not "
+            f"Write one row for each {problem.answer_index_column_name} of the problem. "
+            "Rows are not "
             "interpolated."
         )
         rule = f"must be {len(rows)}"
@@ -208,7 +209,10 @@ def _check_index_values(
         np.abs(values - expected_values)
         > _RTOL_FOR_MATCHING_ANSWER_TIMES * np.abs(expected_values).max()
     )
-    wanted = f"{expected_values[np.argmax(wrong)]:g} {problem.si_units_by_quantity[problem.answer_index_column_name]}"
+    wanted = (
+        f"{expected_values[np.argmax(wrong)]:g} "
+        f"{problem.si_units_by_quantity[problem.answer_index_column_name]}"
+    )
     column._replace(values=values).raise_for_invalid_values(
         problem.answer_index_column_name,
         wrong,

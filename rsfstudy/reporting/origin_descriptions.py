@@ -27,13 +27,13 @@ def describe_scene_and_rig_fields(
 
     Parameters
     ----------
-    heading : str
+    nonzero_fields_heading : str
         Key of the nonzero fields in the returned dictionary.
     scene_fields : mapping of str to object
         Fields of the scene.
-    rig_values : mapping of str to float
+    rig_quantities : mapping of str to float
         Quantities of the rig in SI units.
-    varied_names : collection of str, optional
+    varied_field_names : collection of str, optional
         Names of the fields that vary along an axis. The description omits these fields.
 
     Returns

@@ -33,7 +33,7 @@ class TextTable:
         Caption of the table.
     wrappable_columns : collection of str, optional
         Headings of the columns that contain prose. Lines of prose may be broken between words.
-    last_cell_colours : sequence of str, optional
+    last_column_colours : sequence of str, optional
         Colour of the last cell of each row.
     unformatted_rows : sequence of mapping of str to object, optional
         Unformatted numbers and labels of each row, for JSON output.
@@ -57,7 +57,7 @@ class TextTableColumn(NamedTuple):
         Name of the variable.
     format_function : callable
         Function that formats a value of the variable.
-    unformatted_key : str, default: ""
+    key_in_unformatted_rows : str, default: ""
         Key of the value in ``TextTable.unformatted_rows``. If the key is empty, the value is
         stored with the coordinates of the row.
     """

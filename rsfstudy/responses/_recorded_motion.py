@@ -43,7 +43,7 @@ class RecordedMotion(NamedTuple):
         segment is the value on the slow manifold.
     peak_event : Event or None
         Requested extremum, or None if the motion has no extremum.
-    last_event : Event
+    end_event : Event
         Last event of the motion.
     recorded_rows : ndarray, shape (n, columns)
         Recorded samples. The columns are documented in ``rsfstudy.motion.recording``.
@@ -104,9 +104,9 @@ def record_motion_until_peak(
         Integrator with the requested accuracy.
     event_specs : sequence of EventSpecification
         Specification of the extremum, followed by other events that may end the motion.
-    first_segment : int
+    first_segment_index : int
         Index of the loading segment at which the record begins.
-    peak_segment : int
+    peak_segment_index : int
         Index of the loading segment that contains the extremum.
     end_time : float, default: inf
         End time in units of D_c/V_*.
@@ -291,7 +291,7 @@ def compute_settled_friction_flag(scene: Scene, *, is_friction_constant: bool) -
     ----------
     scene : Scene
         Scene with the last loading segment of the record.
-    is_flat : bool
+    is_friction_constant : bool
         True if friction is nearly constant at the end of the record.
 
     Returns

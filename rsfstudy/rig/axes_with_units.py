@@ -214,14 +214,14 @@ def find_axis_name_and_si_units(field_name: str, value: Any) -> tuple[str, str |
 
     Parameters
     ----------
-    name : str
+    field_name : str
         Name of a rig quantity or of a scene field.
     value : object
         Value of the quantity or field.
 
     Returns
     -------
-    name : str
+    field_name : str
         Name of the axis for the quantity or field.
     units : str or None
         SI units, or None if the value has no units.

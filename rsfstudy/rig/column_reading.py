@@ -93,9 +93,9 @@ class ColumnsReadFromSource(NamedTuple):
 
     Parameters
     ----------
-    columns : dict of str to Column
+    columns_by_name : dict of str to Column
         Columns by name, with their units. All values are finite.
-    table : Table
+    source_table : Table
         Table from which the columns were read.
     row_selection_descriptions : list of str
         Descriptions of the row selection that was applied.
@@ -120,7 +120,7 @@ def read_columns(
         Path of a file in any known format, or object that contains the columns.
     selected_columns : mapping of str to str or tuple, or None
         Heading and units of columns by name.
-    usable_columns : UsableColumns
+    accepted_columns : UsableColumns
         Columns that the calling function can use.
     reading_options : ReadingOptions
         Reading options.

@@ -67,7 +67,7 @@ class AcceptedRecordColumns(NamedTuple):
         each column. The columns ``slip`` and ``displacement`` are alternatives, and so are
         ``shear_stress`` and ``friction``. If the function has found one column of a pair, it does
         not search for the other column.
-    shear_stress_suffices : bool, default: False
+    skips_normal_stress_if_shear_stress : bool, default: False
         If True, the function does not search for ``normal_stress`` after it has found
         ``shear_stress``.
     """
@@ -118,7 +118,7 @@ def read_selected_and_detected_columns(
     selected_columns : mapping of str to str or tuple, or None
         Heading and units of columns by name. If the value is None and the arrays in memory have no
         units, all columns are read.
-    usable_columns : UsableColumns
+    accepted_columns : UsableColumns
         Columns that the calling function can use.
 
     Returns

@@ -162,7 +162,10 @@ def _convert_to_record_units(
     except InvalidValue as error:
         if not column.one_based_column_number:
             raise
-        place = f"{columns_of_source.source_table.heading_location}, column {column.one_based_column_number}"
+        place = (
+            f"{columns_of_source.source_table.heading_location}, column "
+            f"{column.one_based_column_number}"
+        )
         raise error.with_location(place) from error
 
 

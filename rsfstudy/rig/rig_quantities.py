@@ -310,7 +310,7 @@ def derive_scene_fields_from_rig(
     ----------
     rig_values : mapping of str to float or ndarray
         Quantities of the rig in SI units.
-    with_heat : bool, default: True
+    with_shear_heating : bool, default: True
         If True, the result includes the fields of shear heating and thermal pressurisation.
 
     Returns

@@ -164,7 +164,7 @@ class RowSelection:
         ----------
         columns : mapping of str to ndarray
             Columns by name. If a filter is applied, the column ``time`` is in s.
-        filtered_names : sequence of str
+        filtered_column_names : sequence of str
             Names of the columns to filter.
 
         Returns

@@ -45,7 +45,7 @@ class EquationsOfMotion(NamedTuple):
 
     Parameters
     ----------
-    regime : str
+    regime_name : str
         Name of the regime.
     unknown_names : tuple of str
         Names of the unknowns.

@@ -36,12 +36,12 @@ class StateEvolutionDerivatives(NamedTuple):
 
     Parameters
     ----------
-    with_respect_to_log_slip_rate, with_respect_to_state_shift : list of float
+    with_respect_to_log_slip_rate, with_respect_to_stress_induced_shift : list of float
         Derivatives of the state evolution with respect to :math:`\ln V`, and with respect to the
         stress-induced decrease in the state (shift). Each list has one element per state.
     with_respect_to_states : list of list of float
         Derivatives of the state evolution with respect to each state, as a square matrix.
-    relative_error : float
+    max_relative_error_estimate : float
         Largest relative error estimate among the derivatives.
     """
 

@@ -52,7 +52,7 @@ class FrictionFunctions(NamedTuple):
     effective_normal_stress : callable
         Function ``(g, psis, p) -> (s - 1, slope)`` that returns the effective normal stress minus 1
         and its derivative with respect to g.
-    rig_normal_stress : callable
+    measured_effective_normal_stress : callable
         Function ``(g, psis, p) -> (s - 1, slope)`` with the pore pressure outside the fault instead
         of the pore pressure in the fault. A laboratory rig measures this effective normal stress.
     boundary_pressure : callable
@@ -311,7 +311,7 @@ def compute_steady_states(
         Scene that provides the friction parameters.
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state_shift : float
+    stress_induced_state_shift : float
         Stress-induced decrease in the state variable.
 
     Returns

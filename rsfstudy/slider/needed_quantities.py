@@ -1,6 +1,6 @@
 """Check that a scene provides the quantities that its parts need.
 
-The attribute ``received_quantities`` of a part lists the quantities that are passed to its
+The attribute ``received_quantity_names`` of a part lists the quantities that are passed to its
 functions. If effective normal stress is constant, shear stress can be computed from the friction
 coefficient and the normal stress. A part can list additional quantities in its attribute ``needs``.
 If a quantity in ``needs`` is unavailable, the scene rejects the part, because the part would

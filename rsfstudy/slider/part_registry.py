@@ -53,7 +53,7 @@ class PartSlot:
         Description of the slot.
     user_parts : dict of str to type or UserLoading, optional
         User-defined parts that have been used in this process, by name.
-    omit_if_default : bool, default: False
+    default_omitted_from_stored_scenes : bool, default: False
         If True, the name of the default part is omitted from the keys of cells and from stored
         scenes. Use True for every slot that is added in a later version of rsfstudy, so that
         existing journals and files stay valid.

@@ -84,7 +84,7 @@ class Part:
     #: solutions.
     members_derived_from_equations: ClassVar[tuple[str, ...]] = ()
     #: Names of class members that define the equations. If a subclass overrides one of these
-    #: members, the subclass does not inherit ``derived_properties``.
+    #: members, the subclass does not inherit ``members_derived_from_equations``.
     members_defining_equations: ClassVar[frozenset[str]] = frozenset()
     #: Unknowns of a fluid or a loading. The functions ``auxiliary_rates`` and
     #: ``auxiliary_steady_states`` below compute the rates and the steady values of the unknowns
@@ -109,8 +109,8 @@ class Part:
         """Reset the derived properties if the subclass changes the equations.
 
         The derived properties of a part follow from its equations. A subclass that overrides a
-        member of ``defining_methods`` therefore does not inherit the derived properties of its base
-        class.
+        member of ``members_defining_equations`` therefore does not inherit the derived properties
+        of its base class.
         """
         super().__init_subclass__()
         add_new_names_for_former_overrides(cls)
@@ -178,7 +178,7 @@ class Part:
 
         Parameters
         ----------
-        name : str
+        field_name : str
             Name of the field.
         value : object
             Value of the field.
@@ -198,7 +198,7 @@ class Part:
 
         Parameters
         ----------
-        name : str
+        field_name : str
             Name of the field.
         rule : str
             Rule that the value violates.
@@ -482,7 +482,7 @@ def discover_parts(package_name: str, package_path: Iterable[str]) -> dict[str, 
 
     Parameters
     ----------
-    package : str
+    package_name : str
         Name of the package.
     package_path : iterable of str
         Folders of the package, as in the attribute ``__path__``.

@@ -63,7 +63,7 @@ def compute_default_steady_state(
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state_shift : float
+    stress_induced_state_shift : float
         Decrease in the state variable due to stress.
     p : tuple of float
         Parameters of the scene.

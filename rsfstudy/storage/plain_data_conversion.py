@@ -109,12 +109,12 @@ def build_dataclass_from_plain_data(
     Parameters
     ----------
     plain_data : mapping of str to object
-        Values of all fields that are not in ``given_fields``.
+        Values of all fields that are not in ``preset_field_values``.
     dataclass_type : type
         Dataclass to instantiate.
     path_in_file : str
         Path of the data in the file, for error messages.
-    given_fields : mapping of str to object, optional
+    preset_field_values : mapping of str to object, optional
         Values of fields that need no conversion.
     integer_type : type, default: int
         Type to which integer fields are converted, for example an integer type with an upper limit.

@@ -148,11 +148,11 @@ class ResultsComparison:
 
     Parameters
     ----------
-    declaration : mapping of str to tuple of (object, object)
+    differing_declaration_entries : mapping of str to tuple of (object, object)
         Entries of the declaration that differ. Each key is the path of an entry, and each value
         contains the entry of the first dataset and the entry of the second dataset. If an entry is
         missing in a dataset, None replaces the entry.
-    origin : mapping of str to tuple of (object, object)
+    differing_provenance : mapping of str to tuple of (object, object)
         Versions, code digests and machines that differ, by name. Each value contains the entries of
         both datasets.
     differing_axis_points : mapping of str to tuple of (list, list)
@@ -162,7 +162,7 @@ class ResultsComparison:
     finished_cell_counts : tuple of int
         Number of cells that are finished in both datasets, only in the first dataset, and only in
         the second dataset.
-    statuses : pandas.DataFrame
+    differing_statuses : pandas.DataFrame
         Table of the cells that are finished in both datasets and have different statuses. The table
         has one column for each coordinate. The columns ``first`` and ``second`` contain the
         statuses in the first and in the second dataset.
@@ -170,7 +170,7 @@ class ResultsComparison:
         Comparison of the variables in the cells that are finished in both datasets. The function
         ``compare_results_of_same_study`` documents the columns. If the primary output has no error
         estimates, every pair of different values of the primary output is counted in
-        ``beyond_errors``.
+        ``variables_beyond_errors``.
     uncompared_variables : mapping of str to str
         Reason why a variable is not compared, by name of the variable.
     """

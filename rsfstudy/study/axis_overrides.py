@@ -136,8 +136,9 @@ def _relabel_overridden_point(
 
     If the label contains the old value, as in ``"imposed, alpha = 0.25"``, the new value replaces
     the old value in the label. If the label does not contain the old value, but the new value
-    identifies the point (``value_identifies_point``), the label is replaced by the new value, as in
-    ``"alpha = 0.3"``. In all other cases, text such as ``"alpha = 0.3"`` is appended to the label.
+    identifies the point (``new_value_identifies_point``), the label is replaced by the new value,
+    as in ``"alpha = 0.3"``. In all other cases, text such as ``"alpha = 0.3"`` is appended to the
+    label.
     """
     text = f"{field_name} = {_format_without_rounding(new_value)}"
     old_text = re.escape(_format_without_rounding(old_value))

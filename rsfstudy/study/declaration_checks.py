@@ -216,7 +216,7 @@ def check_outputs_are_same_in_all_cells(
     ----------
     measure : Measure
         Measure of the study.
-    measure_field_changes : iterable of mapping of str to object
+    measure_field_changes_of_cells : iterable of mapping of str to object
         New values of measure fields in each cell, by field name.
 
     Raises
@@ -330,7 +330,7 @@ def build_unknown_name_error(
         Name of the argument that contains the unknown name.
     unknown_name : str
         Unknown name.
-    violated_rule : str
+    violated_rule_text : str
         Rule that the name violates.
     known_names : collection of str
         Known names. The error message lists similar known names, unless there is a hint for the

@@ -209,7 +209,7 @@ def build_horizontal_line_overlay(y_position: float, **style: Any) -> DrawFuncti
 
     Parameters
     ----------
-    height : float
+    y_position : float
         Position of the line along y.
     **style : object
         Keyword arguments for `matplotlib.axes.Axes.axhline`.
@@ -236,7 +236,7 @@ def build_reference_line_overlay(
     ----------
     x_variable : str
         Name of the variable along x.
-    function : callable
+    y_function : callable
         Function of the x values that returns the y values.
     legend_label : str
         Legend entry.
@@ -267,7 +267,7 @@ def get_figure_name_for_declaration(figure_or_name: Any, study_name: str) -> str
 
     Parameters
     ----------
-    plot : Figure, callable, module or str
+    figure_or_name : Figure, callable, module or str
         Figure of a study.
     study_name : str
         Name of the study.
@@ -275,8 +275,8 @@ def get_figure_name_for_declaration(figure_or_name: Any, study_name: str) -> str
     Returns
     -------
     str
-        If ``plot`` is a `Figure`, the name of the study. If ``plot`` is a string, the string
-        itself. Otherwise, the name of the function or module.
+        If ``figure_or_name`` is a `Figure`, the name of the study. If ``figure_or_name`` is a
+        string, the string itself. Otherwise, the name of the function or module.
     """
     if isinstance(figure_or_name, Figure):
         return study_name
@@ -292,7 +292,7 @@ def check_is_figure(figure_or_name: Any) -> None:
 
     Parameters
     ----------
-    plot : object
+    figure_or_name : object
         Figure of a study.
 
     Raises

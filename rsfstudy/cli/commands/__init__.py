@@ -4,8 +4,8 @@ To add a command, write one module and add one line to ``MODULE_BY_COMMAND``. Th
 function with the name of the module:
 
 - The decorators of the function declare the arguments and options. The class
-  ``OptionsObjectCommand`` of ``rsfstudy.cli.command_group`` passes all arguments and options to the
-  function as one object.
+  ``CommandWithOptionsObject`` of ``rsfstudy.cli.command_group`` passes all arguments and options to
+  the function as one object.
 - The docstring of the function is the help text.
 - The function creates a result object, prints the result and returns the exit status. If the
   command has the option ``--json``, the result is a subclass of ``CommandResult``, and

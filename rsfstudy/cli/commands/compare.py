@@ -40,7 +40,7 @@ class CompareCommandResult(CommandResult):
     ----------
     results_files : sequence of Path
         Paths of both files.
-    provenance : sequence of mapping of str to object
+    provenance_of_files : sequence of mapping of str to object
         Provenance of both files.
     differences : ResultsComparison
         Differences between the files.
@@ -66,7 +66,8 @@ class CompareCommandResult(CommandResult):
             from rsfstudy.formatting import format_count_with_noun
 
             wrong.append(
-                f"{format_count_with_noun(len(found.differing_statuses), 'cell')} with different statuses"
+                f"{format_count_with_noun(len(found.differing_statuses), 'cell')} with "
+                "different statuses"
             )
         return "; ".join(wrong) or "nothing differs beyond error estimates"
 

@@ -177,7 +177,10 @@ def _write_agreement_figure(
     digits: dict[str, list[tuple[float, float]]] = {}
     problem, label = answer_comparisons[0].problem, "problem"
     if len(answer_comparisons) == 1 and problem.answer_index_column_name:
-        label = f"{problem.answer_index_column_name} ({problem.si_units_by_quantity[problem.answer_index_column_name]})"
+        label = (
+            f"{problem.answer_index_column_name} "
+            f"({problem.si_units_by_quantity[problem.answer_index_column_name]})"
+        )
         for one in answer_comparisons[0].quantity_agreements:
             along = -np.log10(np.maximum(one.relative_differences, 10.0**-problem.digits))
             digits[one.quantity_name] = list(zip(problem.answer_index_values, along, strict=True))

@@ -76,7 +76,7 @@ def compute_code_digest(numba_signature: Any, *functions: Callable[..., Any]) ->
 
     Parameters
     ----------
-    signature : object
+    numba_signature : object
         Numba signature of the functions.
     *functions : callable
         Functions from whose code the digest is computed. Functions called by these functions are
@@ -117,7 +117,7 @@ def compile_or_load_function(function: Callable[..., Any], numba_signature: Any)
     ----------
     function : callable
         Function to compile.
-    signature : object
+    numba_signature : object
         Numba signature of the function.
 
     Returns

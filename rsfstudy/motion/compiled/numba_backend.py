@@ -218,7 +218,7 @@ def compile_equations_of_scene(scene: Scene, *, include_time_equation: bool) -> 
     ----------
     scene : Scene
         Scene of the motions.
-    with_time : bool
+    include_time_equation : bool
         If True, the equations include time as an unknown. If False, the equations without inertia
         are also compiled, because closed orbits are integrated with these equations.
 

@@ -129,7 +129,7 @@ class Stepper(ABC):
             State of the motion.
         workspace : Workspace
             Arrays of the regime.
-        clock : float
+        independent_variable : float
             Value of the independent variable between the beginning and the end of the step.
         """
 
@@ -145,7 +145,7 @@ class Stepper(ABC):
             State of the motion.
         workspace : Workspace
             Arrays of the regime.
-        clock : float
+        independent_variable : float
             Independent variable at the new end of the step.
         """
 
@@ -213,7 +213,7 @@ def interpolate_unknowns(motion, workspace, independent_variable):
         State of the motion.
     workspace : Workspace
         Arrays of the regime.
-    clock : float
+    independent_variable : float
         Value of the independent variable between the beginning and the end of the step.
     """
     workspace.stepper.interpolate_unknowns(motion, workspace, independent_variable)
@@ -228,7 +228,7 @@ def retake_step(motion, workspace, independent_variable):
         State of the motion.
     workspace : Workspace
         Arrays of the regime.
-    clock : float
+    independent_variable : float
         Independent variable at the new end of the step.
     """
     workspace.stepper.retake_step(motion, workspace, independent_variable)

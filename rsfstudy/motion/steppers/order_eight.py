@@ -224,7 +224,7 @@ def retake_step(motion, workspace, independent_variable):
         State of the motion.
     workspace : Workspace
         Arrays of the regime.
-    clock : float
+    independent_variable : float
         Independent variable at the new end of the step.
     """
     motion.end, motion.step_length, motion.is_dense = (
@@ -247,7 +247,7 @@ def interpolate_unknowns(motion, workspace, independent_variable):
         State of the motion.
     workspace : Workspace
         Arrays of the regime.
-    clock : float
+    independent_variable : float
         Value of the independent variable between the beginning and the end of the step.
     """
     if not motion.is_dense:

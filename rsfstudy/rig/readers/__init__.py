@@ -2,7 +2,7 @@
 
 Each module of this package reads one group of file formats. A reader consists of two functions: the
 first function checks if a source has the format of the reader, based on its first bytes or its
-type, and the second function converts the source to a ``SourceTable``. To add a format, write the
+type, and the second function converts the source to a ``LazyTable``. To add a format, write the
 two functions, and add them to ``FORMAT_TESTS_AND_READERS``.
 """
 

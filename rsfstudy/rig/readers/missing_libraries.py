@@ -17,7 +17,7 @@ def build_missing_library_error(
         File.
     format_name : str
         Name of the format with an indefinite article.
-    extra_name : str
+    pip_extra_name : str
         Name of the optional dependency group (extra) of rsfstudy.
     library_name : str
         Name of the library.

@@ -1,7 +1,7 @@
 """Sources of data, and the tables that readers return.
 
 A ``TableSource`` is a file or an object that contains data. A reader converts a source to a
-``SourceTable``.
+``LazyTable``.
 """
 
 from __future__ import annotations
@@ -106,14 +106,14 @@ class LazyTable:
         Headings of all columns, such as ``Time (s)`` or ``Time``.
     heading_location : str
         Location of the headings for error messages.
-    load_column : callable
+    load_numeric_column : callable
         Function that converts the numbers of a column. The function takes the index of the column
         and the name of the quantity, and returns a ``Column``. The units of the column are an empty
         string unless the units follow from the type of the numbers.
     has_headings : bool, default: True
         False if the columns have no headings. In this case, the headings are the column numbers,
         counted from 1.
-    uses_default_units : bool, default: False
+    columns_have_no_units : bool, default: False
         True if no column has units. The columns are then in the default units.
     headings_are_column_names : bool, default: False
         True if an unknown heading is an error, because each heading must be the name of a usable
@@ -274,7 +274,7 @@ def build_table_of_arrays(
         Headings of the columns.
     column_arrays : sequence of ndarray
         Values of each column, as arrays of shape (rows,).
-    location : str
+    heading_location : str
         Location of the headings for error messages.
     path : str, default: ""
         Path of the file.

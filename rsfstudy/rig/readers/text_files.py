@@ -48,11 +48,11 @@ class _TextFileRows(NamedTuple):
 
     Parameters
     ----------
-    numbers : ndarray or None
+    numeric_values : ndarray or None
         Numbers of all fields, as an array of shape (rows, columns), or None if a field is not a
         finite number.
     field_texts : list of list of str
-        Fields of each row as strings. This list is used if ``numbers`` is None.
+        Fields of each row as strings. This list is used if ``numeric_values`` is None.
     line_numbers : ndarray of int
         Line number of each row.
     """

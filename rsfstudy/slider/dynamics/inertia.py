@@ -377,7 +377,7 @@ class Inertia(Dynamics):
     def compute_slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
         """Compute the slip rate norm, which measures the effect of inertia.
 
-        See ``Dynamics.slip_rate_norm``.
+        See ``Dynamics.compute_slip_rate_norm``.
         """
         return scene.inertial_time * math.exp(log_slip_rate)
 
@@ -385,7 +385,7 @@ class Inertia(Dynamics):
     def build_field_rejection_error(cls, field_name: str, value: Any) -> InvalidValue:
         """Return the error for a field that belongs to another dynamics class.
 
-        See ``Part.rejection_error``.
+        See ``Part.build_field_rejection_error``.
         """
         rule = "approximates inertia, so it cannot be combined with inertia=True"
         return InvalidValue(field_name, value, rule, remedy="Omit one of the two.")

@@ -29,7 +29,7 @@ class DrainedFluid(Fluid):
     def build_field_rejection_error(cls, field_name: str, value: Any) -> InvalidValue:
         """Return the error for a field that belongs to another fluid.
 
-        See ``Part.rejection_error``.
+        See ``Part.build_field_rejection_error``.
         """
         if field_name != "pressurisation":
             return super().build_field_rejection_error(field_name, value)

@@ -123,8 +123,8 @@ class TwoStateLaw(LawBase):
     def build_field_rejection_error(cls, field_name: str, value: object) -> InvalidValue:
         """Return the error for a field that belongs to another law.
 
-        See ``Part.rejection_error``. The error message for ``b_over_a`` names the two fields that
-        replace ``b_over_a``.
+        See ``Part.build_field_rejection_error``. The error message for ``b_over_a`` names the two
+        fields that replace ``b_over_a``.
         """
         if field_name == "b_over_a":
             rule = (

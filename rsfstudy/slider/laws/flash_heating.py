@@ -82,7 +82,7 @@ def compute_steady_states(
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state_shift : float
+    stress_induced_state_shift : float
         Stress-induced decrease in the state variable.
     p : tuple of float
         Parameters of the scene.

@@ -268,7 +268,7 @@ class Loading(Part):
 
         Parameters
         ----------
-        name : str
+        field_name : str
             Name of the field.
         value : object
             Value of the field.

@@ -95,9 +95,9 @@ class Temperature(Part):
         ----------
         scene : Scene
             Scene that contains the temperature model.
-        rise : float
+        temperature_rise : float
             Current temperature rise.
-        power : float
+        max_frictional_power : float
             Upper bound on the product of shear stress and slip rate, in :math:`\sigma_* V_*`.
 
         Returns

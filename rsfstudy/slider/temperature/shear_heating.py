@@ -166,9 +166,9 @@ class ShearHeating(Temperature):
     ) -> tuple[float, float]:
         """Compute bounds on the future temperature rise.
 
-        See ``Temperature.rise_bounds``. At any time, the temperature evolves towards the steady
-        temperature for the current power. The steady temperature lies between the steady
-        temperature without slip and the steady temperature at the largest power.
+        See ``Temperature.compute_temperature_rise_bounds``. At any time, the temperature evolves
+        towards the steady temperature for the current power. The steady temperature lies between
+        the steady temperature without slip and the steady temperature at the largest power.
         """
         over_cooling = self.heating / self.cooling
         lowest = -over_cooling * scene.mu_star

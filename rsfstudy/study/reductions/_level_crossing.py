@@ -41,9 +41,9 @@ class LevelCrossing(NamedTuple):
     ----------
     position : float
         Position of the crossing.
-    lower_bound, upper_bound : float
+    position_lower_bound, position_upper_bound : float
         Bounds of the position.
-    status : CrossingSearchStatus
+    search_status : CrossingSearchStatus
         Outcome of the search.
     """
 
