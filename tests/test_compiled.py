@@ -153,7 +153,7 @@ def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
     wanted, addresses = list[tuple[str, ...]](), numba_backend.get_compiled_function_addresses
 
     def asked(equations):
-        wanted.append((equations.regime, *equations.unknown_names))
+        wanted.append((equations.regime_name, *equations.unknown_names))
         return addresses(equations)
 
     study = reduced_study(name)
@@ -290,7 +290,7 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
         compile_cache._jit_compile_callee_cached.cache_clear()
-        monkeypatch.setattr(numba_backend, "_COMPILED_ADDRESSES_BY_FUNCTIONS", {})
+        monkeypatch.setattr(numba_backend, "_COMPILED_FUNCTION_ADDRESS_CACHE", {})
         equations = build_equations_between_ruptures(
             Scene(law=law, normal_stress="constant"), with_time=False
         )

@@ -112,8 +112,8 @@ def test_requested_tolerance_is_met_by_stick_slip_cycles(law, rtol):
 def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
     """The error of the slow manifold is of third order in the weight.
 
-    ``Accuracy.max_log_rate_change_by_inertia`` relies on this order. At the switch, ln V increases
-    by 12.2 per slip of D_c.
+    ``Accuracy.max_log_slip_rate_change_by_inertia`` relies on this order. At the switch, ln V
+    increases by 12.2 per slip of D_c.
     """
 
     @dataclasses.dataclass(frozen=True)
@@ -121,7 +121,7 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
         weight: float = 1e-3
 
         max_inertia_weight_on_slow_manifold = property(lambda self: self.weight)
-        max_log_rate_change_by_inertia = property(lambda _self: math.inf)
+        max_log_slip_rate_change_by_inertia = property(lambda _self: math.inf)
         max_slip_in_return_to_slow_manifold = property(lambda _self: 1e-9)
         local_tolerance = property(lambda _self: 1e-11)
 

@@ -274,7 +274,7 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     for heavy in (False, True):
         for module in (critical_step, motion_after_step):
             monkeypatch.setattr(
-                module, "inertia_matters_below_norm", lambda *_scene, heavy=heavy: heavy
+                module, "is_slow_manifold_inaccurate", lambda *_scene, heavy=heavy: heavy
             )
         values[heavy] = found(scene, rtol=1e-8)[:2]
     (path, error), (forward, its_error) = values[False], values[True]

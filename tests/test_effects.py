@@ -190,7 +190,7 @@ def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(
 
     def seconds(equations, _state):
         turn = next(turns) // 3
-        return (1.0 + turn) * (10.0 if turn % 4 == 0 else 1.0) * slowness[equations.regime]
+        return (1.0 + turn) * (10.0 if turn % 4 == 0 else 1.0) * slowness[equations.regime_name]
 
     monkeypatch.setattr(effects, "_time_right_hand_side", seconds)
     found = effects.EffectCost()(Scene(inertia=True), Accuracy(1e-3)).values

@@ -27,14 +27,14 @@ FREE = ("b", "slip_distance", "mu_star")
 class Relaxation:
     """Model ``mu_star - b (1 - exp(-x/D_c))`` over a displacement of 30 um."""
 
-    averaging_time = 0.0
+    friction_averaging_time = 0.0
 
     @property
     def recorded_friction_per_window(self) -> list[np.ndarray]:
         return [self.recorded_friction]
 
     def __init__(self, truth: ParameterValues, seed: int = 2) -> None:
-        self.time_since_first_row_of_window = self.load_point_displacement = np.linspace(
+        self.time_since_start_of_each_window = self.load_point_displacement = np.linspace(
             0.0, 30.0, ROWS
         )
         noise = np.random.default_rng(seed).standard_normal(ROWS)
@@ -64,8 +64,8 @@ class Relaxation:
     def check_parameters_define_valid_scenes(self, values: ParameterValues) -> None:
         """Accept all values."""
 
-    def compute_loading_error_sensitivity(self, _values: ParameterValues) -> np.ndarray:
-        """Return an empty sensitivity, because there is no load point."""
+    def compute_friction_change_by_loading_error(self, _values: ParameterValues) -> np.ndarray:
+        """Return no changes, because there is no load point."""
         return np.zeros((ROWS, 0))
 
     def compute_jacobian(

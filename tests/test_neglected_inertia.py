@@ -92,7 +92,7 @@ def test_estimate_goes_with_the_accuracy():
     scene, found = CASES[2][2], []
     for rtol in (1e-4, 1e-5, 1e-6, 1e-8):
         recording, rows = recorded(scene, rtol)
-        slow = recording.get_or_add_regime_index(scene.dynamics.regime)
+        slow = recording.get_or_add_regime_index(scene.dynamics.regime_name)
         estimate = estimate_neglected_inertia_error(scene, rows, slow, 0.0)
         assert (np.diff(estimate) >= 0.0).all()
         found.append(estimate[-1] / rtol)
@@ -112,6 +112,6 @@ def test_growth_at_a_peak_has_one_unit_in_both_regimes():
         events = list(integrator.follow(scene, [wanted]))
         peak = next(event for event in events if event.specification == wanted)
         growths[peak.regime] = compute_growth_rate_along_path(scene, peak, 8.22991)
-    assert set(growths) == {RUPTURE_REGIME, scene.dynamics.regime}
+    assert set(growths) == {RUPTURE_REGIME, scene.dynamics.regime_name}
     first, second = growths.values()
     assert math.isclose(first, second, rel_tol=1e-2)

@@ -142,7 +142,10 @@ def test_paths_and_motions_agree(dynamics, monkeypatch):
     """The path solution and the search with motions agree."""
     scene = Scene(**STRESSES[2], **dynamics, stiffness_ratio=1.2, load_velocity_ratio=1.0)
     value, error, _outcome = found(scene)
-    for shot in ("find_critical_size_by_critical_path", "find_critical_size_by_limit_cycle"):
+    for shot in (
+        "find_critical_step_size_by_critical_path",
+        "find_critical_step_size_by_limit_cycle",
+    ):
         monkeypatch.setattr(critical_step, shot, lambda *_asked: None)
     forward, its_error, _outcome = found(scene, accuracy=Accuracy(1e-5))
     assert abs(value - forward) <= error + its_error

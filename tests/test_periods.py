@@ -189,7 +189,7 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
     seen = came_to(scene, transient + events, 1e-7, follow_all_cycles=True).cycles
     by = ReturnMap(scene, Integrator(quick(1e-7)))
-    monkeypatch.setattr(return_map, "DIFFERENCE_STEP_OVER_LOG_RATE_RANGE", 3e-5)
+    monkeypatch.setattr(return_map, "FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:
         begin = extract_section_coordinates(cycle.start_point)

@@ -256,7 +256,7 @@ def test_a_budget_ends_within_a_step(method):
 
     LSODA may continue for ever within one step. Later motions are not affected.
     """
-    regime = SYSTEMS[1][0].regime
+    regime = SYSTEMS[1][0].regime_name
     for budget in range(21, 30):
         integrator = Integrator(Accuracy(1e-6, budget, methods=((regime, method),)))
         with pytest.raises(MotionStopped) as halt:

@@ -70,8 +70,8 @@ def calling(part: type) -> dict[str, Any]:
     """Return the fields that select a part."""
     if part is SliderParameters:
         return {}
-    if part.selected_by:
-        return {part.selected_by: True if is_boolean_field(part, part.selected_by) else 1.0}
+    if field_name := part.selecting_field_name:
+        return {field_name: True if is_boolean_field(part, field_name) else 1.0}
     slot = next(slot for slot in PART_SLOTS if part in slot.built_in_parts.values())
     return (
         {slot.name: part.name}

@@ -36,7 +36,7 @@ else:
             ),
             "api.html_report": ("write_html_report",),
             "api.result_paths": ("find_results_file",),
-            "api.simulation": ("BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME", "simulate"),
+            "api.simulation": ("UNPHYSICAL_MOTION_ATTRIBUTE_NAME", "simulate"),
             "api.study_runs": (
                 "apply_overrides_to_study",
                 "make_run_function_with_progress",

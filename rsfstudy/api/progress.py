@@ -137,7 +137,9 @@ def compile_equations_with_notice(
     )
     with console.status("compiling the equations ..."):
         for scene, clock in itertools.product(example_scenes, includes_time_flags):
-            Engine.import_compiled_engine().compile_equations_of_scene(scene, with_time=clock)
+            Engine.import_compiled_engine().compile_equations_of_scene(
+                scene, include_time_equation=clock
+            )
     programs, seconds = (
         Engine.compilation_log.compiled_program_count - before.compiled_program_count,
         Engine.compilation_log.total_compilation_seconds - before.total_compilation_seconds,

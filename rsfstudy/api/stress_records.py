@@ -63,7 +63,7 @@ def read_stress_record(
         Heading and units of columns by name.
     normal_stress : quantity
         Normal stress by which friction is multiplied. None if the normal stress is unknown.
-    reading_options : ReadingOptions
+    reading_options : RecordReadingOptions
         Reading options.
 
     Returns

@@ -122,7 +122,9 @@ def find_critical_step_size_by_limit_cycle(
     )
     # A limit cycle attracts nearby motions weakly, so the errors of two runs may be similar.
     error = 5.0 * boundary.relative_error if boundary else math.nan
-    return boundary and replace(boundary, relative_error=error, found_from_limit_cycle=True)
+    return boundary and replace(
+        boundary, relative_error=error, limit_cycle_touches_instability_norm=True
+    )
 
 
 def _find_critical_step_size_with_error(

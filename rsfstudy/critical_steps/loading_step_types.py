@@ -239,7 +239,7 @@ class DisplacementStepFamily(LoadingStepFamily):
         )
         if friction is None:
             return _MAX_SPRING_STRESS_AFTER_STEP / scene.stiffness
-        self.largest_step_reaches_norm = True
+        self.largest_step_immediately_reaches_norm = True
         return (
             friction + scene.dynamics.radiated_stress(scene.log_instability_rate)
         ) / scene.stiffness
@@ -382,11 +382,11 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
             return 0.0
         largest = self._compute_max_log_normal_stress_ratio()
         if excess(largest) > 0.0:
-            self.largest_step_reaches_norm = True
+            self.largest_step_immediately_reaches_norm = True
             largest = float(brentq(excess, 0.0, largest, xtol=1e-15, rtol=1e-14))
         if self._allows_steady_sliding(largest):
             return largest
-        self.largest_step_reaches_norm, smaller = False, 0.0
+        self.largest_step_immediately_reaches_norm, smaller = False, 0.0
         while largest - smaller > _RTOL_FOR_FINDING_MAX_STEP_SIZE * largest:
             middle = 0.5 * (smaller + largest)
             smaller, largest = (

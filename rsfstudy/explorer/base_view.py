@@ -54,7 +54,7 @@ class ExplorerView(ABC):
 
     Attributes
     ----------
-    jobs : BackgroundJobs
+    jobs : BackgroundJobRunner
         Runner of computations that take longer than a fraction of a second.
     """
 
@@ -110,7 +110,7 @@ class ExplorerView(ABC):
 
     @abstractmethod
     def set_widget_state(self, widget_state: Mapping[str, Any]) -> None:
-        """Set the widgets to the settings that ``widget_state`` returned.
+        """Set the widgets to the settings that ``get_widget_state`` returned.
 
         Parameters
         ----------
@@ -194,7 +194,7 @@ class ExplorerView(ABC):
         source : object
             Object that the view shows.
         widget_state : mapping of str to object
-            Settings that ``widget_state`` returned. The mapping may be empty.
+            Settings that ``get_widget_state`` returned. The mapping may be empty.
 
         Returns
         -------

@@ -337,7 +337,7 @@ def find_cells_to_mark_with_status(
 
     Returns
     -------
-    StatusMarks
+    CellStatusMarks
         Cells in row-major order.
     """
     rows, columns = np.nonzero(status_codes != int(Status.OK))

@@ -128,7 +128,7 @@ class FitChoices:
 
         Parameters
         ----------
-        build_read_record_arguments : dict of str to object
+        reading_arguments : dict of str to object
             Arguments of ``rsfstudy.read_record``.
 
         Returns

@@ -367,7 +367,10 @@ class ResultsView(ExplorerView):
         )
 
     def format_equivalent_command_line(self) -> str:
-        """Return commands that export the results. See ``ExplorerView.format_equivalent_command_line``."""
+        """Return commands that export the results.
+
+        See ``ExplorerView.format_equivalent_command_line``.
+        """
         return format_selection_as_shell_commands(
             self.selection, self.file, self.widget_state_json, self._find_chosen_cell_coordinates()
         )

@@ -154,10 +154,10 @@ class SceneControls:
             fields[part_slot.name] = part_name
         elif (
             new is not None
-            and new.selected_by
+            and new.selecting_field_name
             and (self._rig is None or part_slot.name == "loading")
         ):
-            fields[new.selected_by] = self._find_typical_value(new.selected_by)
+            fields[new.selecting_field_name] = self._find_typical_value(new.selecting_field_name)
         rig = dict(self.settings.rig)
         for quantity in _EXTRA_RIG_QUANTITIES_BY_PART.get(old.name, ()) if old else ():
             rig.pop(quantity, None)

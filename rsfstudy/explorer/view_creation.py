@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Class of each view, as module and name. The modules import Panel.
 _MODULE_AND_CLASS_BY_VIEW_KIND = {
-    "scene": ("rsfstudy.explorer.simulation_view", "SceneView"),
+    "scene": ("rsfstudy.explorer.simulation_view", "SimulationView"),
     "results": ("rsfstudy.explorer.results_view", "ResultsView"),
     "record": ("rsfstudy.explorer.record_view", "RecordView"),
 }
@@ -43,7 +43,7 @@ def create_view(source: Any = None, state_json: str | None = None) -> ExplorerVi
     Returns
     -------
     ExplorerView
-        View whose method ``panel`` returns the Panel object.
+        View whose method ``build_page`` returns the Panel object.
     """
     kind, loaded = _find_view_kind_and_object(source)
     module, name = _MODULE_AND_CLASS_BY_VIEW_KIND[kind]

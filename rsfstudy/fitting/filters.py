@@ -61,7 +61,7 @@ class Filter:
     >>> from rsfstudy.fitting import Filter
     >>> running_mean = Filter.parse("mean 1.0")
     >>> time = np.arange(0.0, 5.0, 0.25)
-    >>> samples = running_mean.sample_times(time)
+    >>> samples = running_mean.compute_required_sample_times(time)
     >>> filtered = running_mean.apply(time, samples)  # the mean of a straight line is the line
     >>> bool(np.allclose(filtered, time))
     True
@@ -199,8 +199,8 @@ class Filter:
         Returns
         -------
         ndarray, shape (rows,)
-            Filtered values. Running means are correct only in the rows that `complete_rows`
-            returns.
+            Filtered values. Running means are correct only in the rows that
+            `find_fully_averaged_rows` returns.
 
         Raises
         ------

@@ -29,7 +29,7 @@ from rsfstudy.motion import MotionStopped
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-ParameterValueType = TypeVar("ValueType")
+ParameterValueType = TypeVar("ParameterValueType")
 #: Prefixes of the parameters that have a separate value in each window.
 _PER_WINDOW_PARAMETER_PREFIXES = ("mu_star", "step_time", "trend")
 

@@ -108,7 +108,7 @@ class NoiseModel:
 
     Parameters
     ----------
-    uniform_sampling_runs : tuple of SamplingRun
+    uniform_sampling_runs : tuple of UniformSamplingRun
         Runs of consecutive rows with the same noise process and noise level.
     partial_autocorrelations : ndarray, shape (processes, order)
         Partial autocorrelations of each autoregressive process.
@@ -488,7 +488,7 @@ class _LaggedProductSums:
 
     Parameters
     ----------
-    sampling_runs : tuple of SamplingRun
+    sampling_runs : tuple of UniformSamplingRun
         Runs of consecutive rows with the same noise process and noise level.
     columns : ndarray, shape (rows, columns)
         Derivatives of the model, followed by the residuals.

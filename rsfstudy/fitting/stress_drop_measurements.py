@@ -99,7 +99,8 @@ def read_drops(
     >>> noise = np.random.default_rng(0).normal(scale=0.01, size=2000)
     >>> stress = 5.0 + 0.002 * (time % 500.0) + noise  # stress drops by 1 at 500, 1000 and 1500
     >>> readings = read_drops(time, stress, None, check_slip=False)
-    >>> [round(values["static_stress_drop"][0], 1) for values, _ in readings.event_rows]
+    >>> quantities = readings.quantities_of_each_drop
+    >>> [round(values["static_stress_drop"][0], 1) for values, _ in quantities]
     [1.0, 1.0, 1.0]
     """
     found, detection = find_stress_drops(times, stress)

@@ -68,7 +68,7 @@ def find_uniform_sampling_runs(time: np.ndarray) -> tuple[UniformSamplingRun, ..
 
     Returns
     -------
-    tuple of SamplingRun
+    tuple of UniformSamplingRun
         Runs that cover all rows. Each noise process has a single noise level. The index of the
         noise level is equal to the index of the noise process.
     """
@@ -90,14 +90,14 @@ def split_runs_at_noise_level_changes(
 
     Parameters
     ----------
-    sampling_runs : sequence of SamplingRun
+    sampling_runs : sequence of UniformSamplingRun
         Runs that cover all rows.
     change_rows : sequence of int
         Rows at which the noise level changes. Changes close to the ends of a run are ignored.
 
     Returns
     -------
-    tuple of SamplingRun
+    tuple of UniformSamplingRun
         Runs of rows. Between two changes, each noise process has a separate noise level.
     """
     found: list[UniformSamplingRun] = []
@@ -130,7 +130,7 @@ def count_noise_processes(sampling_runs: Sequence[UniformSamplingRun]) -> int:
 
     Parameters
     ----------
-    sampling_runs : sequence of SamplingRun
+    sampling_runs : sequence of UniformSamplingRun
         Runs that cover all rows.
 
     Returns
@@ -148,7 +148,7 @@ def expand_run_field_to_rows(
 
     Parameters
     ----------
-    sampling_runs : sequence of SamplingRun
+    sampling_runs : sequence of UniformSamplingRun
         Runs that cover all rows.
     run_field_name : {"process", "level"}
         Name of the index to return: the index of the noise process, or of the noise level.

@@ -620,9 +620,9 @@ def convert_fit_parameters_to_scene_fields(
 
     Examples
     --------
-    >>> from rsfstudy.fitting.window_model import fit_parameters_to_scene_fields
+    >>> from rsfstudy.fitting.window_model import convert_fit_parameters_to_scene_fields
     >>> values = {"a": 0.01, "b": 0.015, "slip_distance": 10.0, "mu_star": 0.6, "stiffness": 0.002}
-    >>> fields = fit_parameters_to_scene_fields(values, velocity=1.0)
+    >>> fields = convert_fit_parameters_to_scene_fields(values, velocity_unit=1.0)
     >>> {name: round(fields[name], 6) for name in ("stiffness", "reference_rate", "b_over_a")}
     {'stiffness': 0.02, 'reference_rate': 0.1, 'b_over_a': 1.5}
     """

@@ -85,7 +85,7 @@ class PeriodicOrbit:
         Accuracy with which the cycles were computed.
     rhs_evaluation_count : int
         Number of right-hand-side evaluations.
-    recording : Recording, optional
+    recording : MotionRecorder, optional
         Recording along the cycles. The recording may extend beyond the end of the cycles.
     """
 
@@ -150,7 +150,7 @@ class PeriodicOrbit:
             cycles=self.cycles[at:] + self.cycles[:at],
             return_map_derivatives_per_cycle=self.return_map_derivatives_per_cycle[at:]
             + self.return_map_derivatives_per_cycle[:at],
-            start_section_correction=multiply_return_map_derivatives(
+            offset_to_closed_orbit=multiply_return_map_derivatives(
                 self.return_map_derivatives_per_cycle[:at]
             )
             @ self.offset_to_closed_orbit,
@@ -299,7 +299,7 @@ class ReturnMap:
             Section at which the first cycle begins.
         cycle_count : int
             Number of cycles.
-        recording : Recording, optional
+        recording : MotionRecorder, optional
             Recording to which the motion is added.
 
         Returns

@@ -143,7 +143,7 @@ def iterate_stick_slip_cycles(
     start_point : MotionPoint or None
         Point at which the motion starts. If None, the motion starts with the step of the scene, and
         the part of the motion before the first maximum of spring stress is skipped.
-    recording : Recording, optional
+    recording : MotionRecorder, optional
         Recording to which the motion is added.
 
     Yields
@@ -212,7 +212,7 @@ def extract_recorded_rows_of_cycles(
         Scene of the motion.
     cycles : sequence of StickSlipCycle
         Successive cycles.
-    recording : Recording or None
+    recording : MotionRecorder or None
         Recording of the cycles. If None, the record contains only the beginning and the end of the
         cycles.
 

@@ -68,7 +68,7 @@ else:
                 "minimum",
                 "rise",
             ),
-            "motion.deprecated_arguments": ("accept_former_accuracy_and_meter",),
+            "motion.deprecated_arguments": ("accept_deprecated_accuracy_and_meter",),
             "motion.integrator": ("Integrator",),
             # Former export. ``Scene`` has a method that replaces this function.
             "slider.equations": ("compute_slow_manifold_point as slow_manifold_point",),
@@ -78,7 +78,7 @@ else:
             ),
             "motion.neglected_inertia_error": ("estimate_neglected_inertia_error",),
             "motion.motion_resampling": ("resample_motion_along_path",),
-            "motion.recording": ("Recording",),
+            "motion.recording": ("MotionRecorder",),
             "motion.root_finding": ("build_root_finder",),
         },
     )

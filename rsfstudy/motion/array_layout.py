@@ -3,7 +3,7 @@
 The module defines the fields of the motion state and the columns of the tables. A kink is a
 boundary between two loading segments at which the loading rate changes, but the stress does not
 jump. The fields of ``MOTION_STATE_DTYPE`` are written by the following functions. Functions without
-a module name belong to ``motion_loop``, ``regime_starts`` or ``step_ends``.
+a module name belong to ``motion_loop``, ``regime_starts`` or ``step_truncation``.
 
 ========================================  =====================================================
 Fields                                    Written by

@@ -32,7 +32,7 @@ class InPlaceFunctions(NamedTuple):
     fill_motion_point : callable
         Function that fills an array with the values of a point of the motion.
     attempt_step : callable
-        Function that attempts one step. See ``steppers.unrolled_step``.
+        Function that attempts one step. See ``steppers.unrolled_runge_kutta_step``.
     fill_force_balance : callable or None
         Function that fills in ln(V/V_*) and friction on the slow manifold. The value is None for
         the inertial equations of motion in ruptures.
@@ -157,10 +157,10 @@ def build_fill_motion_point_function(
     Returns
     -------
     callable
-        Function ``fill_point(y, rates, p, result)``.
+        Function ``fill_motion_point(y, rates, p, result)``.
     """
 
-    def fill_point(y, rates, p, result):  # type: ignore[no-untyped-def]
+    def fill_motion_point(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[LOG_SLIP_RATE] = math.nan
         point = motion_point_function(
             unpack_unknowns(y), unpack_unknowns(rates), unpack_parameters(p)
@@ -171,7 +171,7 @@ def build_fill_motion_point_function(
         for i in range(state_count):
             result[FIRST_STATE + i] = point.psis[i]
 
-    return fill_point
+    return fill_motion_point
 
 
 def build_fill_force_balance_function(

@@ -286,7 +286,7 @@ class Integrator:
             of the integrator.
         backward : bool, default: False
             If True, the independent variable decreases.
-        recording : Recording, optional
+        recording : MotionRecorder, optional
             Object that records the motion. For a rigid slider, the independent variable is slip, so
             the ``sample_times`` of the recording are values of slip.
 
@@ -331,7 +331,7 @@ class Integrator:
         with_time : bool, default: False
             If True, time is one of the unknowns. If False, the times and slips of events may be
             NaN, and the integration needs fewer right-hand side evaluations.
-        recording : Recording, optional
+        recording : MotionRecorder, optional
             Object that records the motion.
         until : float, default: inf
             Time at which the motion ends, in D_c/V_*.
@@ -375,7 +375,7 @@ class Integrator:
                 start, parameters, table, further = prepare_segment_with_noise(acting, start, table)
                 told = 0  # Every loading segment starts a chain, which reports its start.
             motion = get_motion_driver(
-                acting, self.engine, self.accuracy.methods, with_time=with_time
+                acting, self.engine, self.accuracy.methods, include_time_equation=with_time
             ).iterate_events(
                 start,
                 self.work_meter,

@@ -166,7 +166,7 @@ class MotionDriver:
         evaluation_budget : float, default: inf
             Maximum number of right-hand side evaluations. The remaining budget of the work meter is
             an additional limit.
-        recording : Recording, optional
+        recording : MotionRecorder, optional
             Object that receives the recorded rows.
         later_segments_and_reported_count : tuple of (ndarray, int), optional
             Segment table rows of all loading segments after the first, and a number ``n``. The
@@ -372,8 +372,8 @@ def _build_motion_stopped_error(
     """Create the exception for a motion that cannot continue."""
     if return_code == array_layout.TERMINATED:
         return build_termination_error(
-            int(motion_state.get_state_field("termination")),
-            motion_state.get_state_field("final_normal_stress"),
+            int(motion_state.get_motion_state_field("termination")),
+            motion_state.get_motion_state_field("final_normal_stress"),
         )
     why = "the step size is zero, or a value is not finite"
     if return_code == array_layout.NO_STEP_POSSIBLE:
@@ -381,5 +381,5 @@ def _build_motion_stopped_error(
     why = overflow or why
     return MotionStopped(
         Status.INTEGRATION_FAILED,
-        f"{regime_names[int(motion_state.get_state_field('regime'))]}: {why}",
+        f"{regime_names[int(motion_state.get_motion_state_field('regime'))]}: {why}",
     )

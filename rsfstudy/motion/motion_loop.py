@@ -22,7 +22,7 @@ functions are called in the following order::
         enter_initial_regime           after the end of a loading segment
 
 The functions that start regimes and segments are in ``regime_starts``. The functions that take a
-step, end a step, record samples and detect events are in ``step_integration``, ``step_ends``,
+step, end a step, record samples and detect events are in ``step_integration``, ``step_truncation``,
 ``step_samples`` and ``step_events``, respectively.
 
 The docstring of the module ``array_layout`` lists the functions that write each field of
@@ -33,10 +33,10 @@ event loop detects and locates the events in the same way for all steppers.
 The code of these modules is limited to Python features that Numba can compile. To debug a rupture,
 simulate a scene with ``inertia=True`` and ``engine="scipy"``. To debug the stages of an integration
 step, use ``engine="python"`` instead. Set a breakpoint in
-``step_ends.truncate_step_at_end_of_regime_or_segment`` with the condition ``motion.regime == 1``
-(``FAST_REGIME``). The debugger then stops once in every step of the rupture. The arrays
-``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the points of the motion at both
-ends of the step. The constant ``array_layout.LOG_SLIP_RATE`` and the constants defined after it are
+``step_truncation.truncate_step_at_end_of_regime_or_segment`` with the condition
+``motion.regime == 1`` (``FAST_REGIME``). The debugger then stops once in every step of the rupture.
+The arrays ``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the points of the
+motion at both ends of the step. The constant ``array_layout.LOG_SLIP_RATE`` and the constants defined after it are
 the column indices of these arrays. To stop at the end of a rupture, set a breakpoint with the same
 condition at ``return REGIME_ENDED`` in ``integrate_one_regime``. To stop at the beginning of a
 rupture, set a breakpoint at ``return REGIME_ENDED`` with the condition ``motion.regime == 0``.
@@ -275,7 +275,7 @@ def integrate_one_regime(
             workspace.unknown_count,
         )
     evaluate_function_into_array(
-        workspace.functions.fill_point,
+        workspace.functions.fill_motion_point,
         workspace.y,
         workspace.rates,
         workspace.parameters,
@@ -288,7 +288,7 @@ def integrate_one_regime(
         if should_record_step(motion, workspace, requested_samples):
             halve_step_until_dense_output_is_accurate(motion, workspace)
         evaluate_function_into_array(
-            workspace.functions.fill_point,
+            workspace.functions.fill_motion_point,
             workspace.y_end,
             workspace.rates_at_end,
             workspace.parameters,

@@ -107,7 +107,7 @@ def enter_initial_regime(
         Output array of the unknowns.
     last_point : array of shape (FIRST_STATE + states,)
         Initial point of the motion or of the loading segment.
-    functions : array of shape (2, FUNCTION_COUNT_PER_REGIME)
+    functions : array of shape (2, FUNCTION_TABLE_COLUMN_COUNT)
         Function table with one row per regime.
     slow_manifold_values : array
         Memory for ln(V/V_*) and friction on the slow manifold.

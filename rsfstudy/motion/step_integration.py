@@ -292,7 +292,7 @@ def evaluate_point_within_step(motion, workspace, independent_variable):
         workspace.rates_within,
     )
     evaluate_function_into_array(
-        workspace.functions.fill_point,
+        workspace.functions.fill_motion_point,
         workspace.y_within,
         workspace.rates_within,
         workspace.parameters,

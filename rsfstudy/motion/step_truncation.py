@@ -146,7 +146,7 @@ def repeat_step_to_segment_end_time(motion, workspace, independent_variable):
             motion, workspace, workspace.rates_at_end
         )
     evaluate_function_into_array(
-        workspace.functions.fill_point,
+        workspace.functions.fill_motion_point,
         workspace.y_end,
         workspace.rates_at_end,
         workspace.parameters,

@@ -2,7 +2,7 @@
 
 ``motion_loop.advance_motion`` creates a workspace for each regime, and steppers receive it as an
 argument. The arrays are written by the following functions. Functions without a module name belong
-to ``motion_loop``, ``regime_starts`` or ``step_ends``.
+to ``motion_loop``, ``regime_starts`` or ``step_truncation``.
 
 =========================================  ====================================================
 Arrays                                     Written by
@@ -74,7 +74,7 @@ class Workspace(NamedTuple):
         are part of this array.
     order_eight_step_block : array
         Header, final unknowns, scales and dense output of an order-eight step. See
-        ``steppers.unrolled_step``.
+        ``steppers.unrolled_runge_kutta_step``.
     scales : array of shape (unknown_count,)
         Scales of the unknowns. The allowed error of an unknown is the tolerance multiplied by the
         sum of its scale and its magnitude.

@@ -62,7 +62,7 @@ def choose_figure_and_build_panels(
         return corner_plots.posterior_figure(dataset)
     if name == _NAME_OF_FITS_FIGURE and requested_figure is variable is None:
         return Declared(
-            importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").build_panels_of_figure(
+            importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").build_fit_panels(
                 dataset
             )
         ), dataset
@@ -154,8 +154,8 @@ def _build_generic_figure(dataset: xr.Dataset, variable: str | None = None) -> D
     dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
     if corner := corner_plots.build_corner_figure(dataset, variable):
         return corner
-    for module in (maps, lines):
-        if found := module.build_panels_of_figure(dataset, variable):
+    for build_panels in (maps.build_map_panels, lines.build_line_panels):
+        if found := build_panels(dataset, variable):
             return Declared(found)
     choices = [
         str(name) for name, values in dataset.data_vars.items() if _axes.is_numeric_variable(values)

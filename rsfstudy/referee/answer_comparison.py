@@ -405,9 +405,8 @@ def _iterate_answers_in_other_conventions(
             yield words, reported_answer | {name: reported_answer[name] / factor}
         if several:
             apart = float(np.median(reported_answer[name] - known_answer[name]))
-            words = f"{name} is shifted by {apart:.6g} {problem.si_units_by_quantity[name]}".removesuffix(
-                " 1"
-            )
+            units = problem.si_units_by_quantity[name].removesuffix("1")
+            words = f"{name} is shifted by {apart:.6g} {units}".rstrip()
             yield words, reported_answer | {name: reported_answer[name] - apart}
 
 

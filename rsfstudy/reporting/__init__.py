@@ -78,14 +78,14 @@ else:
             ),
             "reporting.event_tables": (
                 "build_record_events_tables_and_sentences",
-                "summarise_record_events_as_fields",
+                "summarise_events_as_json_fields",
             ),
             "reporting.fit_tables": (
                 "are_all_fits_valid",
                 "build_fit_table",
                 "contains_fits",
                 "split_into_single_fits",
-                "summarise_fits_as_fields",
+                "summarise_fits_as_json_fields",
             ),
             "reporting.fit_summaries": ("format_value_with_stderr",),
             "reporting.hold_summaries": ("is_hold_table", "summarise_holds"),
@@ -93,8 +93,8 @@ else:
             "reporting.json_summaries": (
                 "build_result_variables_table",
                 "classify_file_contents",
-                "summarise_file_as_fields",
-                "summarise_study_as_fields",
+                "summarise_file_as_json_fields",
+                "summarise_study_as_json_fields",
             ),
             "reporting.origin_descriptions": (
                 "describe_scene_and_rig_fields",

@@ -88,7 +88,7 @@ def compute_jacobian_of_steady_sliding(
     else:
         equations = scene.equations_against_displacement()
         state = (steady_state.spring_stress, *steady_state.states)
-    integrator.work_meter.charge(equations.regime, 2 * len(state))
+    integrator.work_meter.charge(equations.regime_name, 2 * len(state))
     return compute_jacobian(equations, state)
 
 

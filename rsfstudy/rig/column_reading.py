@@ -66,7 +66,7 @@ class RecordReadingOptions(RowSelection):
 
         Returns
         -------
-        ReadingOptions
+        RecordReadingOptions
             Validated options.
 
         Raises
@@ -95,7 +95,7 @@ class ColumnsReadFromSource(NamedTuple):
     ----------
     columns_by_name : dict of str to Column
         Columns by name, with their units. All values are finite.
-    source_table : Table
+    source_table : LazyTable
         Table from which the columns were read.
     row_selection_descriptions : list of str
         Descriptions of the row selection that was applied.
@@ -120,9 +120,9 @@ def read_columns(
         Path of a file in any known format, or object that contains the columns.
     selected_columns : mapping of str to str or tuple, or None
         Heading and units of columns by name.
-    accepted_columns : UsableColumns
+    accepted_columns : AcceptedRecordColumns
         Columns that the calling function can use.
-    reading_options : ReadingOptions
+    reading_options : RecordReadingOptions
         Reading options.
 
     Returns

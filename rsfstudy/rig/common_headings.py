@@ -113,12 +113,12 @@ def read_selected_and_detected_columns(
 
     Parameters
     ----------
-    table : Table
+    table : LazyTable
         Table with all columns.
     selected_columns : mapping of str to str or tuple, or None
         Heading and units of columns by name. If the value is None and the arrays in memory have no
         units, all columns are read.
-    accepted_columns : UsableColumns
+    accepted_columns : AcceptedRecordColumns
         Columns that the calling function can use.
 
     Returns
@@ -246,7 +246,7 @@ def build_missing_columns_error(table: LazyTable, rule: str) -> InvalidValue:
 
     Parameters
     ----------
-    table : Table
+    table : LazyTable
         Table with all columns.
     rule : str
         Sentence that names the missing columns.

@@ -1,6 +1,6 @@
 """Scenes for the lattice cells of a study of a rig.
 
-`LatticeScenesOnRig` converts axes with physical units to dimensionless scene fields.
+`RigAxesToScenesConverter` converts axes with physical units to dimensionless scene fields.
 """
 
 from __future__ import annotations

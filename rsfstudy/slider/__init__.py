@@ -14,8 +14,8 @@ We suggest reading the other modules in the following order:
 - ``friction_relation`` defines the relation between stress, slip rate and states, and
   ``state_functions`` defines functions of the state variables. ``temperature_functions`` adds the
   effects of a changing temperature.
-- ``rate_functions`` and ``point_functions`` build the equations of motion from friction and from
-  the dynamics. ``path_length`` defines the independent variable.
+- ``rate_functions`` and ``motion_point_functions`` build the equations of motion from friction and
+  from the dynamics. ``path_length`` defines the independent variable.
 - ``steady_state`` and ``stability`` compute steady sliding and its linear stability from the
   friction relation.
 - ``closed_forms`` contains published closed-form solutions.
@@ -113,7 +113,7 @@ else:
             "slider.closed_forms": (
                 "CLOSED_FORMS",
                 "compute_critical_stiffness as critical_stiffness_closed_form",
-                "compute_effective_friction",
+                "compute_coulomb_effective_friction",
             ),
             "slider.dynamics.inertia": ("NEGLIGIBLE_SECOND_ORDER_WEIGHT",),
             "slider.equations": ("EquationsOfMotion",),

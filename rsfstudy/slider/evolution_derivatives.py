@@ -73,7 +73,7 @@ class StateEvolutionDerivatives(NamedTuple):
         ]
         return self._replace(
             with_respect_to_log_slip_rate=by_log_slip_rate,
-            with_respect_to_state_shift=by_shift,
+            with_respect_to_stress_induced_shift=by_shift,
             with_respect_to_states=by_state,
         )
 
@@ -194,7 +194,7 @@ def _compute_finite_difference_scales(
     scene: SceneView, steady_state: SteadySliding, stress_induced_state_shift: float
 ) -> list[float]:
     """Return the finite-difference scales of ln V, the shift and each state."""
-    size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_over_a
+    size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_per_log_rate_over_a
     # If the law has several states, the sum of all b may be close to zero even if each b is large.
     of_shift = (
         size if scene.parts.law.state_count > 1 else _STATE_SCALE_OVER_B * abs(scene.b) or size

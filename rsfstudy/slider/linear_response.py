@@ -69,7 +69,11 @@ def linearise_force_balance(
     damping = (
         0.0 if quasi_static else scene.dynamics.radiated_stress_slope(steady_state.log_slip_rate)
     )
-    norm = 0.0 if quasi_static else scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
+    norm = (
+        0.0
+        if quasi_static
+        else scene.dynamics.compute_slip_rate_norm(scene, steady_state.log_slip_rate)
+    )
     return LinearisedForceBalance(
         *compute_linear_friction_response(scene, steady_state, evolution_derivatives), damping, norm
     )

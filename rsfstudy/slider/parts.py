@@ -115,7 +115,9 @@ class Part:
         super().__init_subclass__()
         add_new_names_for_former_overrides(cls)
         if cls.members_defining_equations & vars(cls).keys():
-            base = next(kind for kind in cls.__mro__ if "derived_properties" in vars(kind))
+            base = next(
+                kind for kind in cls.__mro__ if "members_derived_from_equations" in vars(kind)
+            )
             for name in cls.members_derived_from_equations:
                 if name not in vars(cls):
                     setattr(cls, name, vars(base)[name])

@@ -34,7 +34,7 @@ from rsfstudy.slider.slider_parameters import ALTERNATIVE_FIELD_NAMES_FOR_STIFFN
 _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
     {
         "field_index",
-        "cache",
+        "result_cache",
         "friction_functions",
         "parameter_values",
         "friction_parameter_values",

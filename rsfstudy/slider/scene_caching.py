@@ -49,7 +49,7 @@ def cached_per_scene(
     def wrapper(
         scene: Any, /, *stated: ParametersAfterScene.args, **named: ParametersAfterScene.kwargs
     ) -> FunctionResult:
-        made, key = scene.cache, (function, *stated, *named.values())
+        made, key = scene.result_cache, (function, *stated, *named.values())
         # The code looks the key up only once, because hashing a key can be slow.
         found = made.get(key)
         if found is None:

@@ -259,7 +259,7 @@ def find_min_steady_log_slip_rate(scene: SceneView) -> float:
     strongest = value - shift
     if strongest > 1e6:
         return -math.inf
-    if scene.parts.law.steady_states is None and not any(scene.parts.temperature.activation):
+    if scene.parts.law.steady_states is None and not any(scene.parts.temperature.activation_terms):
         return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
 
     def excess(log_slip_rate: float) -> float:

@@ -113,7 +113,7 @@ def build_temperature_dependent_functions(
             i + (i >= law_states) for i in isothermal_functions["indices_of_states_in_distance"]
         ),
     }
-    if any(parts.temperature.activation):
+    if any(parts.temperature.activation_terms):
         contribution = isothermal_functions["state_contribution_to_friction"]
         replacements |= {
             "strength": _add_temperature_to_strength(isothermal_functions["strength"], places),
@@ -380,7 +380,7 @@ def compute_steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> f
     log_slip_rate = max(log_slip_rate, _MIN_HEATING_LOG_SLIP_RATE)
     count = max(1, math.ceil(abs(log_slip_rate) / _MAX_LOG_SLIP_RATE_CONTINUATION_STEP))
     # Without activation terms, only differences of temperature matter.
-    coldest = -1.0 if any(scene.parts.temperature.activation) else -math.inf
+    coldest = -1.0 if any(scene.parts.temperature.activation_terms) else -math.inf
     rise, before = 0.0, 0.0
     for step in range(count + 1):
         x = log_slip_rate * step / count
@@ -427,7 +427,7 @@ def compute_thermal_friction_change(scene: SceneView, states: FloatTuple) -> flo
         Change in the friction coefficient, :math:`(a q_a - b q_b) \Lambda`. The change is zero if
         the friction does not depend on temperature.
     """
-    if not any(scene.parts.temperature.activation):
+    if not any(scene.parts.temperature.activation_terms):
         return 0.0
     direct, evolution = pack_temperature_parameter_values(scene)[:2]
     rise = states[scene.parts.law.state_count]

@@ -174,7 +174,7 @@ def check_axis_fields_and_units(
         Axes of the study.
     scene_field_names : sequence of str
         Names of all scene fields.
-    axis_unit_converter : LatticeScenesOnRig or None
+    axis_unit_converter : RigAxesToScenesConverter or None
         Converter of axis values with units, or None if the study has no rig.
 
     Raises

@@ -104,7 +104,7 @@ class NumbaBackend:
 
         Returns
         -------
-        ndarray of int, shape (2, FUNCTION_COUNT_PER_REGIME)
+        ndarray of int, shape (2, FUNCTION_TABLE_COLUMN_COUNT)
             Addresses of the functions, one row per regime.
         """
         return _build_function_address_table(

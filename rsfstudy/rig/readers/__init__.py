@@ -70,7 +70,7 @@ def read_table_from_source(
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Columns of the source.
 
     Raises

@@ -48,14 +48,16 @@ def read_mapping_or_dataframe(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Table of the arrays.
     """
     keys = [*source.path_or_object]
     headings = [*map(str, keys)]
     has_units = any("(" in heading or "[" in heading for heading in headings)
     table = _build_table_of_mapping(source.path_or_object, keys, headings)
-    return replace(table, uses_default_units=not has_units, headings_are_column_names=not has_units)
+    return replace(
+        table, columns_have_no_units=not has_units, headings_are_column_names=not has_units
+    )
 
 
 def is_xarray_dataset(source: TableSource) -> bool:
@@ -84,7 +86,7 @@ def read_xarray_dataset(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Table of the one-dimensional variables.
     """
     return _build_table_of_dataset(source.path_or_object)
@@ -116,7 +118,7 @@ def read_netcdf_file(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Table of the one-dimensional variables.
 
     Raises
@@ -162,7 +164,7 @@ def read_columns_of_record(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Table of the columns, whose headings contain their units.
     """
     columns = source.path_or_object.columns
@@ -177,7 +179,7 @@ def _build_table_of_dataset(dataset: xr.Dataset) -> LazyTable:
     table = _build_table_of_mapping(
         dataset, names, append_units_to_headings([*map(str, names)], units)
     )
-    return replace(table, uses_default_units=not any(units))
+    return replace(table, columns_have_no_units=not any(units))
 
 
 def _build_table_of_mapping(mapping: Any, keys: list[Any], headings: list[str]) -> LazyTable:

@@ -48,7 +48,7 @@ def read_matlab_file(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Columns of equal length. If the arrays differ in length, the table contains only the arrays
         with the most common length. If several lengths are equally common, the longest of these
         lengths is used.

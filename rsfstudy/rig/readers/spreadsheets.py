@@ -67,7 +67,7 @@ def read_workbook(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Columns of the sheet.
 
     Raises

@@ -281,7 +281,7 @@ def build_table_of_arrays(
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Table with the arrays.
     """
 

@@ -52,7 +52,7 @@ def read_tdms_file(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Channels with their units.
 
     Raises

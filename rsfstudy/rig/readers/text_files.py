@@ -96,7 +96,7 @@ def read_text_file(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Columns of the file.
 
     Raises

@@ -40,7 +40,7 @@ class TextLayout(NamedTuple):
     Parameters
     ----------
     delimiter : str
-        Delimiter of the columns, or `BLANK_DELIMITER`.
+        Delimiter of the columns, or `WHITESPACE_DELIMITER`.
     headings : list of str
         Headings of the columns, with units. If the file has no header, the headings are the numbers
         of the columns, counted from 1. The list is empty if the file contains no text.
@@ -85,7 +85,7 @@ def split_line_into_fields(line: str, delimiter: str) -> list[str]:
     line : str
         Line of a text file.
     delimiter : str
-        Delimiter of the fields, or `BLANK_DELIMITER`.
+        Delimiter of the fields, or `WHITESPACE_DELIMITER`.
 
     Returns
     -------

@@ -50,7 +50,7 @@ def read_xlook_file(source: TableSource) -> LazyTable:
 
     Returns
     -------
-    SourceTable
+    LazyTable
         Columns of the file, with the units in the file.
 
     Raises

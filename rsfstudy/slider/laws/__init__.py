@@ -155,7 +155,11 @@ class LawBase(Part):
         False, "1 if slip can reverse with the sign of the shear stress, otherwise 0"
     )
 
-    members_derived_from_equations = ("has_closed_orbits", "scale_free", "relaxation")
+    members_derived_from_equations = (
+        "has_closed_orbits",
+        "lacks_characteristic_slip_rate",
+        "relaxation",
+    )
     members_defining_equations = frozenset({"evolution", "evolutions"})
     received_quantity_names = QUANTITIES_RECEIVED_BY_LAWS
     #: Number of states of the law.
@@ -399,7 +403,7 @@ class Law(LawBase):
             raise self.build_field_error("b_over_a", rule, remedy)
         if not self.b_over_a and scene.parts.slider.initial_state:
             rule = "has no effect, because b_over_a is 0"
-            raise scene.parts.slider.field_error("initial_state", rule, "Omit initial_state.")
+            raise scene.parts.slider.build_field_error("initial_state", rule, "Omit initial_state.")
         if 0.0 < abs(self.b_over_a) < MIN_NONZERO_B_OVER_A:
             raise self.build_field_error(
                 "b_over_a",

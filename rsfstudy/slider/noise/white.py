@@ -114,7 +114,7 @@ class WhiteNoise(Noise):
         velocity, but not to sampled histories.
         """
         loading, fluid = scene.parts.loading, scene.parts.fluid
-        if loading.unknowns or loading.reported_segment_count < len(loading.segments) - 1:
+        if loading.unknowns or loading.reported_segment_start_count < len(loading.segments) - 1:
             rule = f"cannot be added to the loading {loading.name!r}"
             remedy = "Noise can only be added to steady loading, steps and protocols."
             raise InvalidValue("loading_noise", self.name, rule, remedy=remedy)
