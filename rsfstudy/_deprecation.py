@@ -205,15 +205,15 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "laboratory": "rig",
         "declared_in": "source_file",
         "own_parts": "user_parts",
-        "own_classes": "user_classes",
-        "of_scene": "scene_field_names",
-        "fields_of": "scene_fields_of_row",
-        "changes": "cell_changes",
-        "split": "split_rows",
+        "own_classes": "user_defined_classes",
+        "of_scene": "scene_and_rig_field_names",
+        "fields_of": "convert_row_to_scene_fields",
+        "changes": "compute_cell_field_changes",
+        "split": "split_scene_and_measure_fields",
         "place": "describe_cell",
     },
     "rsfstudy.study.claims:Claim": {
-        "check_place": "check_selection",
+        "check_place": "check_applies_to_dataset",
         "minus": "baseline",
         "minus_variable": "baseline_variable",
         "because": "difference_reason",
@@ -230,7 +230,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "minus": "intercept",
     },
     "rsfstudy.study.figure_declarations": {
-        "level": "horizontal_line",
+        "level": "build_horizontal_line_overlay",
     },
     "rsfstudy.study.figure_declarations:Panel()": {
         "by": "hue",
@@ -258,7 +258,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.study.reductions.base:Reduction": {
         "measured_in": "unit_fields",
         "of_failures": "uses_failed_cells",
-        "draws_on": "support_status",
+        "draws_on": "get_status_of_used_cells",
     },
     "rsfstudy.plots": {
         "place": "describe_point",

@@ -48,8 +48,8 @@ FLOORS = (
 )
 #: Modules that may import a library which is slow to import.
 HOMES = {
-    "dask": {"execution/clusters", "storage/dataset_files", "storage/zarr_store"},
-    "distributed": {"execution/clusters", "execution/worker_pool", "execution/worker_log"},
+    "dask": {"execution/dask_clusters", "storage/dataset_files", "storage/zarr_store"},
+    "distributed": {"execution/dask_clusters", "execution/worker_pool", "execution/worker_log"},
     "llvmlite": {"motion/compiled/compile_cache", "motion/compiled/array_operations"},
     "matplotlib": {"plots"},
     "numba": {

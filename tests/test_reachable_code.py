@@ -41,7 +41,7 @@ def edit(monkeypatch, path):
         != ModuleImportGraph({path: SOURCES[path]}).compute_digests()
     )
     monkeypatch.setattr(
-        provenance, "_import_graph_at_import_time", ModuleImportGraph({**SOURCES, **changed})
+        provenance, "_import_graph_of_running_code", ModuleImportGraph({**SOURCES, **changed})
     )
 
 
@@ -83,7 +83,7 @@ def test_a_longer_axis_adds_the_modules_of_its_laws(tmp_path, monkeypatch):
     stored = json.loads(found.attrs["provenance"])["fingerprint"]["physics"]
     assert {"slider.laws.slip", "slider.laws.slowness"} <= set(stored)
     resume(study_of_critical_steps("slip"), tmp_path, monkeypatch)  # It keeps both modules.
-    monkeypatch.setattr(provenance, "_import_graph_at_import_time", ModuleImportGraph(SOURCES))
+    monkeypatch.setattr(provenance, "_import_graph_of_running_code", ModuleImportGraph(SOURCES))
     with pytest.raises(DataError, match=r"physics \(slider.laws.slowness\)"):
         rsfstudy.run(both, output=tmp_path, **OPTIONS)
     with closing(sqlite3.connect(tmp_path / "steps.cells.sqlite")) as db:

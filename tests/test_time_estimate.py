@@ -72,8 +72,8 @@ def test_the_estimate_is_printed_once(monkeypatch):
 
 def test_short_fits_show_no_progress(monkeypatch):
     short, long = ([(time, 1000, 0.0)] for time in (19.0, 21.0))
-    assert lines(short, monkeypatch, items="fits", delay=20.0) == []
-    assert lines(long, monkeypatch, items="fits", delay=20.0) == [
+    assert lines(short, monkeypatch, item_name="fits", delay_seconds=20.0) == []
+    assert lines(long, monkeypatch, item_name="fits", delay_seconds=20.0) == [
         "map: 1,000 of 1,000 fits after 21 s"
     ]
 

@@ -294,7 +294,9 @@ def make_run_function_with_progress(
     ready = prepare_study_run(study, output_options, worker_pool)
     # Fits of a record usually take a few seconds, and then need no progress report.
     is_fit = study.plot == "fits"
-    appearance: Any = {"items": "fits", "delay": _FIT_PROGRESS_DELAY_SECONDS} if is_fit else {}
+    appearance: Any = (
+        {"item_name": "fits", "delay_seconds": _FIT_PROGRESS_DELAY_SECONDS} if is_fit else {}
+    )
 
     def run() -> xr.Dataset:
         """Compile the equations if necessary, and run the study."""

@@ -3,8 +3,8 @@
 The digests are computed from the objects in memory, because the source files may have changed since
 the import. Measures that are defined in the modules of named studies are treated like user-defined
 measures, because the other code in these modules does not affect the results. The digests do not
-include the code of Python, of installed packages and of rsfstudy. The module ``module_graph``
-computes the digests of rsfstudy.
+include the code of Python, of installed packages and of rsfstudy. The module
+``module_import_graph`` computes the digests of rsfstudy.
 """
 
 from __future__ import annotations

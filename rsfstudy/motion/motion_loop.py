@@ -36,10 +36,11 @@ step, use ``engine="python"`` instead. Set a breakpoint in
 ``step_truncation.truncate_step_at_end_of_regime_or_segment`` with the condition
 ``motion.regime == 1`` (``FAST_REGIME``). The debugger then stops once in every step of the rupture.
 The arrays ``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the points of the
-motion at both ends of the step. The constant ``array_layout.LOG_SLIP_RATE`` and the constants defined after it are
-the column indices of these arrays. To stop at the end of a rupture, set a breakpoint with the same
-condition at ``return REGIME_ENDED`` in ``integrate_one_regime``. To stop at the beginning of a
-rupture, set a breakpoint at ``return REGIME_ENDED`` with the condition ``motion.regime == 0``.
+motion at both ends of the step. The constant ``array_layout.LOG_SLIP_RATE`` and the constants
+defined after it are the column indices of these arrays. To stop at the end of a rupture, set a
+breakpoint with the same condition at ``return REGIME_ENDED`` in ``integrate_one_regime``. To stop
+at the beginning of a rupture, set a breakpoint at ``return REGIME_ENDED`` with the condition
+``motion.regime == 0``.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ finished, so that an interrupted run can be resumed. Only one run at a time can 
 The key of a cell is a digest of the exact values of the scene fields and the measure fields. The
 fingerprint of a journal contains all settings that affect the results, except the fields in the
 cell keys. If the fingerprint of the journal differs from the fingerprint of the run, the run
-rejects the journal (see ``fingerprints``). As an exception, the run may have a larger work budget
-than the journal.
+rejects the journal (see ``run_fingerprints``). As an exception, the run may have a larger work
+budget than the journal.
 """
 
 from __future__ import annotations

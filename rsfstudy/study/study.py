@@ -443,7 +443,7 @@ class Study:
 
         Returns
         -------
-        all_scene_field_names : dict of str to object
+        scene_fields : dict of str to object
             Values of the scene fields.
         measure_fields : dict of str to object
             Values of the measure fields.
@@ -645,7 +645,7 @@ class Study:
     ) -> Axis:
         """Create an axis that varies one field.
 
-        For a study with a rig, numbers without units are assumed to be in ``axis_field_units``.
+        For a study with a rig, numbers without units are assumed to be in ``units``.
         """
         if self.rig is None:
             return Axis(field_name, values)

@@ -189,7 +189,7 @@ def _compute_saltelli_indices(sample_values: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     sample_values : ndarray, shape (2 + inputs, sets, points)
-        Values of each set, in the order described in `_compute_indices_with_intervals`.
+        Values of each set, in the order described in `_compute_indices_and_bootstrap_bounds`.
 
     Returns
     -------
