@@ -130,10 +130,15 @@ def test_a_notebook_gets_a_panel_object():
 )
 def test_a_slider_covers_its_range(limits, value):
     assert limits.low < value < limits.high
-    assert limits.value_at(limits.position_of(value)) == pytest.approx(value, rel=1e-3)
-    assert limits.value_at(0.0) == pytest.approx(limits.low, rel=1e-3)
-    assert limits.value_at(1.0) == pytest.approx(limits.high, rel=1e-3)
-    assert (limits.position_of(-1e9), limits.position_of(1e9)) == (0.0, 1.0)
+    assert limits.convert_position_to_value(
+        limits.convert_value_to_position(value)
+    ) == pytest.approx(value, rel=1e-3)
+    assert limits.convert_position_to_value(0.0) == pytest.approx(limits.low, rel=1e-3)
+    assert limits.convert_position_to_value(1.0) == pytest.approx(limits.high, rel=1e-3)
+    assert (limits.convert_value_to_position(-1e9), limits.convert_value_to_position(1e9)) == (
+        0.0,
+        1.0,
+    )
 
 
 def wait_until(condition):
