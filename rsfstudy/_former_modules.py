@@ -17,7 +17,7 @@ from typing import Any
 #: Pairs of new module paths, relative to ``rsfstudy``, by former module path. The first path of a
 #: pair is the module that now contains the names. The second path of a pair is the public module
 #: from which users import the names. Both paths are empty for former packages without public names.
-NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE = {
+REPLACEMENT_MODULES_BY_FORMER_MODULE = {
     "analysis": ("", ""),
     "analysis.fitting": ("", ""),
     "analysis.fitting.filters": ("fitting.filters", "fitting"),
@@ -73,14 +73,14 @@ class FormerModuleFinder(MetaPathFinder, Loader):
             Specification of the module. The value is None if the name is not a former path.
         """
         top, _, name = fullname.partition(".")
-        if top != "rsfstudy" or name not in NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE:
+        if top != "rsfstudy" or name not in REPLACEMENT_MODULES_BY_FORMER_MODULE:
             return None
-        _present, public = NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE[name]
+        _present, public = REPLACEMENT_MODULES_BY_FORMER_MODULE[name]
         if public:
             text = f"The module {fullname} is deprecated. Import from rsfstudy.{public}."
             warnings.warn(text, DeprecationWarning, stacklevel=2)
         is_package = any(
-            other.startswith(f"{name}.") for other in NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE
+            other.startswith(f"{name}.") for other in REPLACEMENT_MODULES_BY_FORMER_MODULE
         )
         return ModuleSpec(fullname, self, is_package=is_package)
 
@@ -114,14 +114,14 @@ class _ModuleForwardingToNewPath(ModuleType):
 
     def __getattr__(self, name: str) -> Any:
         """Look up an attribute in the module at the new path."""
-        present, _public = NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE[self.__name__.partition(".")[2]]
+        present, _public = REPLACEMENT_MODULES_BY_FORMER_MODULE[self.__name__.partition(".")[2]]
         if not present or (name.startswith("__") and name != "__all__"):
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
         return getattr(importlib.import_module(f"rsfstudy.{present}"), name)
 
     def __dir__(self) -> list[str]:
         """Return the names in the module at the new path."""
-        present, _public = NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE[self.__name__.partition(".")[2]]
+        present, _public = REPLACEMENT_MODULES_BY_FORMER_MODULE[self.__name__.partition(".")[2]]
         return dir(importlib.import_module(f"rsfstudy.{present}")) if present else []
 
 

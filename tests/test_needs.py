@@ -10,11 +10,11 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
 from rsfstudy.slider.laws import Law
-from rsfstudy.slider.needed_quantities import (
+from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A
+from rsfstudy.slider.quantities_required_by_parts import (
     QUANTITIES_A_PART_MAY_NEED,
     find_quantities_known_to_part,
 )
-from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A
 
 
 def evolution(log_slip_rate, state, p):

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import rsfstudy
-from rsfstudy._former_modules import NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE
+from rsfstudy._former_modules import REPLACEMENT_MODULES_BY_FORMER_MODULE
 
 ROOT = Path(rsfstudy.__file__).parent
 #: Packages that only export names of other packages.
@@ -126,10 +126,10 @@ def test_surfaces_load_no_module():
 
 
 @pytest.mark.parametrize(
-    "name", [n for n, (present, _) in NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE.items() if present]
+    "name", [n for n, (present, _) in REPLACEMENT_MODULES_BY_FORMER_MODULE.items() if present]
 )
 def test_former_modules_stay_importable(name):
-    present, public = NEW_AND_PUBLIC_MODULE_BY_FORMER_MODULE[name]
+    present, public = REPLACEMENT_MODULES_BY_FORMER_MODULE[name]
     new = importlib.import_module(f"rsfstudy.{present}")
     sys.modules.pop(f"rsfstudy.{name}", None)
     with warnings.catch_warnings(record=True) as caught:

@@ -141,7 +141,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     if len(t) < 2 * _MIN_SEGMENT_ROWS:
         return ()
     t0, x0 = t[0], x[0]
-    variance, louder = noise_variance(t, x), _compute_local_over_global_noise(t, x)
+    variance, louder = noise_variance(t, x), _compute_noise_of_steps_over_whole_record(t, x)
     sums = CumulativeSumsForLineFits(t - t0, x - x0, 1.0 / louder**2)
     knots = sorted(
         split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
@@ -301,7 +301,9 @@ def _compute_deviations_from_neighbours(time: np.ndarray, displacement: np.ndarr
     return np.asarray(off)
 
 
-def _compute_local_over_global_noise(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+def _compute_noise_of_steps_over_whole_record(
+    time: np.ndarray, displacement: np.ndarray
+) -> np.ndarray:
     """Estimate the local noise of the displacement, relative to the typical noise.
 
     Returns

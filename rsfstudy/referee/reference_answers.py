@@ -171,7 +171,9 @@ def _compute_critical_velocity(problem: BenchmarkProblem, accuracy: Accuracy) ->
     return (problem.rig.reference_velocity * found["critical_velocity_ratio"],)
 
 
-def _compute_critical_displacement(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
+def _compute_critical_displacement_step(
+    problem: BenchmarkProblem, accuracy: Accuracy
+) -> tuple[float]:
     """Compute the critical displacement step in m."""
     found = _apply_measure_to_problem(problem, accuracy, CriticalStep(of="displacement_step"))
     return (problem.rig.slip_distance * found["critical_displacement"],)
@@ -196,7 +198,7 @@ _COMPUTE_FUNCTION_BY_SCALAR_QUANTITIES: Mapping[
         "angular_frequency",
     ): _compute_linear_stability_quantities,
     ("critical_velocity",): _compute_critical_velocity,
-    ("critical_displacement",): _compute_critical_displacement,
+    ("critical_displacement",): _compute_critical_displacement_step,
     (
         "recurrence_interval",
         "static_stress_drop",

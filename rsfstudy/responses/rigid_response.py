@@ -20,7 +20,7 @@ from rsfstudy.status import Status
 
 #: Smallest evolution of friction after a step, as a fraction of a. Smaller changes are dominated by
 #: rounding errors.
-_MIN_FRICTION_EVOLUTION_OVER_A = 1e-9
+_MIN_FRICTION_CHANGE_AFTER_STEP_OVER_A = 1e-9
 
 #: Results of the measure for stress changes and their ratios, with scales and meanings.
 _STRESS_CHANGE_OUTPUTS = (
@@ -193,7 +193,7 @@ class RigidResponse(Measure):
             compute_frictional_stress_after_step(scene, log_slip_rate),
             sliding.frictional_stress,
         )
-        if abs(start - steady) < _MIN_FRICTION_EVOLUTION_OVER_A * scene.a:
+        if abs(start - steady) < _MIN_FRICTION_CHANGE_AFTER_STEP_OVER_A * scene.a:
             return Outcome(Status.NOT_APPLICABLE, message="friction does not evolve after the step")
         level = steady + (start - steady) / math.e
         distance, left, rows = self._integrate_stress_over_slip(scene, start, level, integrator)

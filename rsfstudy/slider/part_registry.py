@@ -20,13 +20,13 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity, is_valid_variable_name
 from rsfstudy.slider import dynamics, fluid, laws, loading, noise, normal_stress, temperature
 from rsfstudy.slider.field_name_hints import replace_law_alias_by_law_name
-from rsfstudy.slider.needed_quantities import check_names_of_needed_quantities
 from rsfstudy.slider.parts import (
     Part,
     is_boolean_field,
     list_part_field_names,
     list_part_field_quantities,
 )
+from rsfstudy.slider.quantities_required_by_parts import check_names_of_needed_quantities
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.user_loadings import UserLoading
 

@@ -35,7 +35,7 @@ LOG_SLIP_RATE_OF_STOPPED_SLIP = -290.0 * math.log(10.0)
 #: Upper limit of ln(V_0/V). The rate functions replace larger values by this limit. The contact is
 #: then treated as stationary, because the neglected slip changes the state by a relative amount
 #: below exp(-100).
-MAX_LOG_LOAD_OVER_SLIP_VELOCITY = 100.0
+MAX_LOG_RATIO_OF_LOAD_TO_SLIP_VELOCITY = 100.0
 
 #: Change in ln V that has the same path length as one unit of displacement (D_c) or one unit of
 #: inertial time.
@@ -75,7 +75,7 @@ def compute_velocity_ratios(log_slip_rate: float, p: FloatTuple) -> VelocityRati
     Without the lower limit, however, the derivative would overflow and the fraction would
     underflow.
     """
-    least = p[LOG_LOAD_VELOCITY] - MAX_LOG_LOAD_OVER_SLIP_VELOCITY
+    least = p[LOG_LOAD_VELOCITY] - MAX_LOG_RATIO_OF_LOAD_TO_SLIP_VELOCITY
     x = least if log_slip_rate < least else log_slip_rate
     slower = math.exp(p[LOG_LOAD_VELOCITY] - x)
     return x, slower, 1.0 / (1.0 + slower)

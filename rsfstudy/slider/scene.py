@@ -28,9 +28,9 @@ from rsfstudy.slider import (
 )
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.loading.step import StepLoading
-from rsfstudy.slider.needed_quantities import check_needed_quantities
 from rsfstudy.slider.noise.none import NoNoise
 from rsfstudy.slider.parts import FloatTuple
+from rsfstudy.slider.quantities_required_by_parts import check_needed_quantities
 from rsfstudy.slider.scene_assembly import SceneParts
 from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.scene_functions import SceneFunctions

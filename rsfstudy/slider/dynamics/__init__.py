@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.slider.needed_quantities import QUANTITIES_A_PART_MAY_NEED
 from rsfstudy.slider.parts import NumericFunction, Part, discover_parts
+from rsfstudy.slider.quantities_required_by_parts import QUANTITIES_A_PART_MAY_NEED
 from rsfstudy.slider.scene_view import SceneView
 
 

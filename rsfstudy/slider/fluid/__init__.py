@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider.needed_quantities import PORE_PRESSURE, SLIP_RATE
 from rsfstudy.slider.parts import (
     POSITIVE,
     FloatTuple,
@@ -22,6 +21,7 @@ from rsfstudy.slider.parts import (
     discover_parts,
     number,
 )
+from rsfstudy.slider.quantities_required_by_parts import PORE_PRESSURE, SLIP_RATE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
-from rsfstudy.slider.needed_quantities import QUANTITIES_RECEIVED_BY_LAWS
 from rsfstudy.slider.parts import (
     NON_NEGATIVE,
     POSITIVE,
@@ -32,6 +31,7 @@ from rsfstudy.slider.parts import (
     flag,
     number,
 )
+from rsfstudy.slider.quantities_required_by_parts import QUANTITIES_RECEIVED_BY_LAWS
 from rsfstudy.slider.scene_view import SceneView
 
 #: Upper limit of exponents in evolution laws. A larger exponent occurs only in a trial step that

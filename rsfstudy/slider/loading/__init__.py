@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.needed_quantities import SLIP_RATE
 from rsfstudy.slider.parts import NON_NEGATIVE, FloatTuple, Part, discover_parts, number
+from rsfstudy.slider.quantities_required_by_parts import SLIP_RATE
 from rsfstudy.slider.scene_view import SceneView
 
 #: Minimum duration of a segment in D_c/V_*. The integrator cannot resolve shorter segments. At

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.slider.needed_quantities import SHEAR_STRESS
 from rsfstudy.slider.parts import NumericFunction, Part, discover_parts
+from rsfstudy.slider.quantities_required_by_parts import SHEAR_STRESS
 from rsfstudy.slider.scene_view import SceneView
 
 

@@ -21,13 +21,13 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.slider.needed_quantities import (
+from rsfstudy.slider.parts import NumericFunction, Part, discover_parts
+from rsfstudy.slider.quantities_required_by_parts import (
     EFFECTIVE_NORMAL_STRESS,
     FRICTION_COEFFICIENT,
     SHEAR_STRESS,
     SLIP_RATE,
 )
-from rsfstudy.slider.parts import NumericFunction, Part, discover_parts
 from rsfstudy.slider.scene_view import SceneView
 
 

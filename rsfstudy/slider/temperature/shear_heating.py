@@ -10,9 +10,12 @@ from dataclasses import dataclass
 
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.laws import lacks_critical_stiffness
-from rsfstudy.slider.needed_quantities import EFFECTIVE_NORMAL_STRESS, FRICTION_COEFFICIENT
 from rsfstudy.slider.parameter_layout import LOG_SLOWNESS_UPPER_LIMIT
 from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, FloatTuple, number
+from rsfstudy.slider.quantities_required_by_parts import (
+    EFFECTIVE_NORMAL_STRESS,
+    FRICTION_COEFFICIENT,
+)
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.temperature import Temperature
 
