@@ -61,7 +61,7 @@ def law_order_claim(smaller: str, larger: str) -> Claim:
 
 
 def variable_normal_stress_claim(law: str) -> Claim:
-    """Return the claim that variable normal stress lowers the step (L6).
+    """Return the claim that variable normal stress reduces the critical step (L6).
 
     The paper reports this result for the slip law.
 

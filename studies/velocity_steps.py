@@ -6,7 +6,7 @@ and the estimate of D_c is the displacement over which the evolution decays to 1
 machines, the estimates of a and b are too small. At 10 k_cr, tenfold steps give a value of a that
 is 14 to 40 % too small. The estimate of a - b is correct if friction has reached steady state. The
 error of the estimate of D_c depends on the stiffness of the machine. Under the slowness law, this
-error also depends on the direction of the step. Correcting the estimate for stiffness does not
+error also depends on the direction of the step. A correction of D_c for the stiffness does not
 remove these two dependences. Under the slip law, large steps up on soft machines end in
 instability.
 """
@@ -35,8 +35,8 @@ def peak_departure(law: str, ratio: float) -> float:
     """Compute the difference of peak friction from the closed form.
 
     The difference is computed to first order in a/K. The difference has two causes. First, the
-    evolution is incomplete while slip accelerates. Second, slip is faster than the load point while
-    friction decreases, which increases the direct effect.
+    evolution is incomplete while slip accelerates. Second, the slider moves faster than the load
+    point while friction decreases. The higher slip rate increases the direct effect.
 
     Parameters
     ----------

@@ -191,7 +191,7 @@ def _compute_max_rate_rise_by_pore_pressure(
 def _find_extreme_pressure_and_heat_states(
     scene: Scene, motion_point: MotionPoint, log_slip_rate: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the states at the highest pore pressure and extreme temperatures.
+    """Return the states at the highest pore pressure and the temperature limits.
 
     The bounds are valid as long as the slip rate does not exceed ``log_slip_rate``.
     """

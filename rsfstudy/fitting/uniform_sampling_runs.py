@@ -86,7 +86,7 @@ def find_uniform_sampling_runs(time: np.ndarray) -> tuple[UniformSamplingRun, ..
 def split_runs_at_noise_level_changes(
     sampling_runs: Sequence[UniformSamplingRun], change_rows: Sequence[int]
 ) -> tuple[UniformSamplingRun, ...]:
-    """Split sampling runs at changes in the noise level.
+    """Divide runs of equally spaced samples where the noise level changes.
 
     Parameters
     ----------

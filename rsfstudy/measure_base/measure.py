@@ -370,7 +370,7 @@ class Measure(ConstructorKeywordCheckMixin):
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Compute the results for one scene.
 
-        If a motion cannot continue, the reason becomes the status of the outcome.
+        If a motion cannot continue, the status of the outcome states why.
 
         Parameters
         ----------

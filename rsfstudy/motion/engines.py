@@ -1,6 +1,6 @@
 """Names of the engines that integrate motions: SciPy, Python and compiled.
 
-A user-defined stepper (ODE integrator) is an additional engine. The module ``engine_factory``
+A user-defined stepper (ODE integrator) can be selected as an engine. The module ``engine_factory``
 creates steppers and loads the compiled engine.
 """
 

@@ -78,7 +78,7 @@ class WorkMeter:
         self.check_budget()
 
     def add_evaluations(self, regime_name: str, evaluations: int) -> None:
-        """Add right-hand side evaluations without a check of the budget.
+        """Add to the count of evaluations without checking the budget.
 
         Parameters
         ----------

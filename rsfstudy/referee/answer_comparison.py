@@ -411,7 +411,7 @@ def _iterate_answers_in_other_conventions(
 
 
 def _find_common_conversion_factor(factor: float, rtol: float) -> tuple[str, float] | None:
-    """Find a common conversion factor that is close to a given factor.
+    """Find a well-known conversion factor that matches a given factor.
 
     The relative difference between the given factor and the common conversion factor must not
     exceed the tolerance.

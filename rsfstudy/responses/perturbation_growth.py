@@ -1,7 +1,7 @@
 """Growth of small perturbations of steady sliding, from the equations of motion.
 
-The equations of motion are differentiated numerically. The resulting growth rates are independent
-of the growth rates that follow from the friction relation.
+The equations of motion are differentiated numerically. The module does not use the friction
+relation, so the growth rates can be compared with the growth rates from the friction relation.
 """
 
 from __future__ import annotations

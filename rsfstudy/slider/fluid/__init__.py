@@ -39,8 +39,8 @@ class Fluid(Part):
 
     The argument ``log_slip_rate`` is :math:`\ln(V/V_*)`, ``states`` is the tuple of the unknowns,
     and ``p`` is the tuple of parameters, in which the parameters of the fluid start at
-    ``p[FLUID]``. When slip stops, the changes per unit slip are infinite, but their product with
-    ``fraction`` remains finite.
+    ``p[FLUID]``. When slip stops, the changes per unit slip are infinite, but the
+    changes remain finite if they are multiplied by the argument ``fraction``.
 
     The distance between the unknowns and their values in steady sliding determines whether a motion
     has settled and whether a cycle repeats. The attribute ``excluded_from_distance`` lists the

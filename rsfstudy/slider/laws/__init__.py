@@ -112,9 +112,10 @@ class LawBase(Part):
     shift, fraction, p)``. The function ``evolutions`` returns a tuple with the change of each state
     per unit slip, multiplied by ``fraction``. The argument ``fraction`` is the slip per unit of the
     independent variable of the integration. The functions ``evolutions`` and ``steady_states``
-    divide the decrease ``shift`` among the states. The decreases of all states must add up to
-    ``shift``. The field or property ``b_over_a`` is the total evolution effect of all states,
-    divided by the direct effect a. See the module ``two_slip_states`` for an example.
+    divide the decrease ``shift`` among the states. The sum of the decreases of all states must
+    equal the argument ``shift``. The field or property ``b_over_a`` is the total evolution effect
+    of all states, divided by the direct effect a. See the module ``two_slip_states`` for an
+    example.
 
     Any unknown that affects friction, such as temperature, can be modelled as a state. The value of
     the state must be expressed as a contribution to the friction coefficient.
