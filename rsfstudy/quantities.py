@@ -133,11 +133,8 @@ class Output(Quantity):
     def __post_init__(self) -> None:
         """Check that a description accompanies a symbol, units or a scale."""
         if not self.long_name and (self.symbol or self.scale or self.units != "1"):
-            rule = (
-                f"must contain a description of {self.name!r}, because {self.name!r} has a "
-                "symbol, units or a scale"
-            )
-            raise InvalidValue("long_name", self.long_name, rule)
+            rule = "must not be empty, because the output has a symbol, units or a scale"
+            raise InvalidValue(f"long_name of output {self.name!r}", self.long_name, rule)
 
     @property
     def variable_names(self) -> tuple[str, ...]:
@@ -160,6 +157,17 @@ def is_valid_variable_name(name: object) -> bool:
         names to form C.
     """
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
+
+
+def describe_invalid_variable_name(name: object) -> tuple[str, str]:
+    """Return the rule that an invalid variable name breaks, and a remedy."""
+    if isinstance(name, str) and name.isidentifier():
+        rule = "is not in Unicode normalisation form NFC"
+        return rule, "Convert the name with unicodedata.normalize('NFC', name)."
+    return (
+        "must be a Python identifier",
+        "Use only letters, digits and underscores, and begin with a letter.",
+    )
 
 
 def format_unit_quotient(units_or_scales: Sequence[str]) -> str:

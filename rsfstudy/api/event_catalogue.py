@@ -253,7 +253,7 @@ def events(
     moves = None if moved is None else _convert_samples_to_finite_array("displacement", moved)
     for name, samples in (("shear_stress", stress), ("displacement", moves)):
         if samples is not None and len(samples) != len(times):
-            rule = f"must have {len(times)} samples, as many as 'time'"
+            rule = f"must have as many samples as 'time' ({len(times)})"
             raise InvalidValue(name, len(samples), rule)
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
@@ -343,8 +343,8 @@ def _convert_samples_to_finite_array(variable_name: str, values: Any) -> np.ndar
         raise InvalidValue(variable_name, values, "must be numbers") from error
     if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
         rule = (
-            f"must have at least {MIN_SAMPLES} samples in one dimension, because the noise "
-            "is estimated from the samples"
+            f"must be one-dimensional with at least {MIN_SAMPLES} samples (got an array of "
+            f"shape {samples.shape}), because the noise is estimated from the samples"
         )
         raise InvalidValue(variable_name, samples.shape, rule)
     if not np.isfinite(samples).all():

@@ -174,8 +174,9 @@ def check_alpha_can_be_fitted(
         ]
         by_steps = loading_kind == "steps" and any(step.stress_ratio != 1.0 for step in steps)
         if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
-            rule = "requires a normal stress that changes, but the "
-            rule += f"fitted steps of {record.name} do not change the normal stress"
-            remedy = "Remove alpha, select a step in normal stress (steps=), or use the "
-            remedy += "recorded normal stress with --loading recorded (loading=)."
-            raise InvalidValue("free", "alpha", rule, remedy=remedy)
+            rule = "cannot be fitted, because the normal stress does not change in the fitted "
+            rule += f"steps of record {record.name!r}"
+            remedy = "Remove alpha from the free parameters, select a step in normal stress with "
+            remedy += "steps=, or use the recorded normal stress with loading='recorded' (on the "
+            remedy += "command line: --loading recorded)."
+            raise InvalidValue("alpha", ..., rule, remedy=remedy)

@@ -424,8 +424,8 @@ def _find_initial_stiffness(
             return 0.0, float(rig.stiffness * 1e-6), 0.0
         if "stiffness" in free_parameters:
             return 1e-3, 0.0, 0.0
-        remedy = "Pass --stiffness (stiffness=), for example '1.6e-3 /um', "
-        remedy += "or fit the stiffness: --free (free=)."
+        remedy = "Pass a value, for example --stiffness '1.6e-3 /um' (in Python, stiffness=), or "
+        remedy += "fit it by adding stiffness to the free parameters (--free, or free= in Python)."
         raise InvalidValue("stiffness", None, "is required", remedy=remedy)
     over_stress = isinstance(stated_stiffness, Real) or Rig.is_stiffness_in_friction_per_length(
         stated_stiffness
@@ -443,7 +443,8 @@ def _find_initial_stiffness(
     for record in records:
         if "normal_stress" not in record.columns:
             remedy = (
-                "Pass --normal-stress (normal_stress of read_record), or the stiffness in 1/um."
+                "Pass the normal stress with --normal-stress (in Python, normal_stress= of "
+                "read_record), or pass the stiffness in 1/um."
             )
             rule = f"requires a normal stress, but {record.name} has no normal stress"
             raise InvalidValue("stiffness", stated_stiffness, rule, remedy=remedy)
@@ -469,13 +470,11 @@ def _measure_stiffness_in_records(records: Sequence[Record]) -> tuple[float, flo
     found = np.array([(float(of[name]), float(of[f"{name}_stderr"])) for of in tables])
     found = found[np.isfinite(found).all(axis=1)]
     if not len(found):
-        rule = (
-            "requires a portion of the record in which the fault is locked: the reloading after a "
-        )
-        rule += "hold, an unloading and reloading, or the initial loading"
+        rule = "requires a part of the record in which the fault is locked, such as the reloading "
+        rule += "after a hold, an unloading and reloading, or the initial loading"
         remedy = (
-            "Pass the stiffness as a quantity, for example '1.6e-3 1/um', or fit the "
-            "stiffness: --free (free=)."
+            "Pass the stiffness as a quantity, for example '1.6e-3 1/um', or fit it by adding "
+            "stiffness to the free parameters (--free, or free= in Python)."
         )
         raise InvalidValue("stiffness", STIFFNESS_OPTION_FROM_RECORD, rule, remedy=remedy)
     value, stderr = compute_weighted_mean(*found.T)

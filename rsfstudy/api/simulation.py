@@ -216,11 +216,11 @@ def simulate(
     duration = _compute_default_duration(scene) - began if duration is None else duration
     known = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
     if not (known and 0.0 < duration < math.inf):
-        remedy = (
-            "Give the duration in units of D_c/V_*. To convert a duration in other units, use "
-            "rig.dimensionless."
-        )
-        raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
+        rule, remedy = "must be a positive, finite number in units of D_c/V_*", ""
+        if isinstance(duration, str):
+            rule = "must be a number in units of D_c/V_*"
+            remedy = "To convert a duration with units, use rig.dimensionless."
+        raise InvalidValue("duration", duration, rule, remedy=remedy)
     is_alone = integrator is None
     if integrator is None:
         integrator = Integrator(Accuracy(rtol, budget, engine=engine))
@@ -471,7 +471,9 @@ def _check_requested_times(
         return None
     if duration is not None:
         raise InvalidValue(
-            "duration", duration, "cannot be combined with times. Pass either duration or times"
+            "duration",
+            duration,
+            "cannot be combined with 'times'. Pass either 'duration' or 'times'",
         )
     given = np.array(times, dtype=object)
     if not all(isinstance(time, Real) and not isinstance(time, bool) for time in given.flat):

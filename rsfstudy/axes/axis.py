@@ -18,7 +18,7 @@ from rsfstudy._deprecation import accept_former_keyword_names, add_former_member
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_number_or_text, is_sequence_of_axis_values
-from rsfstudy.quantities import is_valid_variable_name
+from rsfstudy.quantities import describe_invalid_variable_name, is_valid_variable_name
 from rsfstudy.slider import SceneFields
 
 AxisPointFieldValues = Mapping[str, Any]
@@ -171,8 +171,8 @@ class Axis:
     ) -> None:
         """Create an axis from values or points."""
         if not is_valid_variable_name(dimension):
-            rule = "must be a Python identifier in Unicode normalisation form NFC"
-            raise InvalidValue("axis name", dimension, rule)
+            rule, remedy = describe_invalid_variable_name(dimension)
+            raise InvalidValue("axis name", dimension, rule, remedy=remedy)
         labels: tuple[str, ...] | None = None
         if (
             isinstance(values, Mapping)
@@ -341,7 +341,8 @@ class Axis:
         for number, row in enumerate(self.rows):
             for name, value in row.items():
                 if not isinstance(value, float | str | bool | None):
-                    raise InvalidValue(name, value, "must be a number, a bool or a string")
+                    rule = "must contain only numbers, bools and strings"
+                    raise InvalidValue(f"axis {name!r}", value, rule)
                 if isinstance(value, str):
                     check_storable_text(name, value)
                 if isinstance(value, float) and not math.isfinite(value):
@@ -487,9 +488,9 @@ def _build_rows_from_columns(
     lengths = {name: len(column) for name, column in values_by_field.items()}
     for name, length in lengths.items():
         if not is_valid_variable_name(name):
-            raise InvalidValue("column", name, "does not have the name of a field")
+            raise InvalidValue("column", name, "is not the name of a field")
         if name == dimension:
-            rule = "has the name of the axis"
+            rule = "has the same name as the axis"
             remedy = "Rename the column or the axis."
             raise InvalidValue("column", name, rule, remedy=remedy)
         if length != max(lengths.values()):

@@ -139,11 +139,11 @@ def _compute_stds_and_correlation_matrix(
     except (TypeError, ValueError):
         given = np.empty(0)
     if given.shape != (count, count) or not np.isfinite(given).all():
-        rule = (
-            f"must be a {count} by {count} matrix of finite numbers, with rows and columns in "
-            f"the parameter order ({', '.join(distributions)})"
-        )
-        raise InvalidValue("covariance", covariance, rule)
+        rule = f"must be a {count} by {count} matrix of finite numbers"
+        remedy = f"The order of the rows and columns is {', '.join(distributions)}."
+        if count == 1:
+            remedy = f"The matrix contains the variance of {', '.join(distributions)}."
+        raise InvalidValue("covariance", covariance, rule, remedy=remedy)
     variances = np.diag(given)
     if not np.allclose(given, given.T, rtol=1e-9, atol=0.0) or (variances <= 0.0).any():
         rule = "must be symmetric with positive variances on the diagonal"
@@ -153,8 +153,8 @@ def _compute_stds_and_correlation_matrix(
     if method == "saltelli" and not np.array_equal(correlation, np.eye(count)):
         rule = "must be diagonal, because Sobol indices require independent quantities"
         remedy = (
-            "Use method='sobol', or sample independent quantities and compute the fields "
-            "from them with fields=."
+            "Use method='sobol', which draws correlated samples without Sobol indices, or sample "
+            "independent quantities and compute the fields from them with fields=."
         )
         raise InvalidValue("covariance", given.tolist(), rule, remedy=remedy)
     lowest = float(np.linalg.eigvalsh(correlation)[0])
@@ -228,7 +228,8 @@ def _compute_quantiles(
         raise InvalidValue(
             quantity_name,
             _describe_distribution(distribution),
-            "has quantiles that are not finite. Check the parameters of the distribution",
+            "has quantiles that are not finite numbers",
+            remedy="Use a distribution whose parameters are finite single numbers.",
         )
     return found
 

@@ -99,7 +99,7 @@ record_reading_options = combine_option_decorators(
         metavar="N",
         default=1,
         show_default=False,
-        help="Keep every Nth row. The filter is applied first.  [default: keep all rows]",
+        help="Keep every Nth row, after --filter has been applied.  [default: keep all rows]",
     ),
     click.option(
         "--filter",

@@ -136,15 +136,15 @@ def print_study_declaration(declaration: StudyDeclaration) -> None:
         "outputs": ", ".join(f"{n}{w}" for n, w in with_errors.items() if not n.endswith("_error")),
         "reductions": ", ".join(r.describe()["name"] for r in study.reductions),
         "claims": ", ".join(dict.fromkeys(c.id for c in study.claims)),
-        "cells": f"{study.size:,}{others}",
-        "cost": "; ".join(filter(None, costs)),
+        "number of cells": f"{study.size:,}{others}",
+        "computational cost": "; ".join(filter(None, costs)),
     }
     print_tables_and_sentences([{name: text or "-" for name, text in about.items()}])
 
 
 def _format_axis_heading(axis: Axis) -> str:
     """Format the dimension of an axis and its number of values."""
-    return f"axis {axis.dimension} ({format_count_with_noun(len(axis), 'value')})"
+    return f"axis {axis.dimension!r} ({format_count_with_noun(len(axis), 'value')})"
 
 
 def _format_axis_points(axis_points: Sequence[str]) -> str:

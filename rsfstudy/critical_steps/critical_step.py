@@ -166,7 +166,7 @@ class CriticalStep(Measure):
             raise InvalidValue(
                 "of",
                 self.of,
-                "is not the name of a step that the measure can compute",
+                "must be the name of a step that the measure can compute",
                 choices=STEP_FAMILY_BY_SCENE_FIELD,
             )
         if self.direction not in STEP_DIRECTIONS:
@@ -236,7 +236,7 @@ class CriticalStep(Measure):
         """
         check_loading_is_single_step(scene)
         if scene.starts_unsteady:
-            rule = "differs from steady sliding, but critical steps start from steady sliding"
+            rule = "is not a steady state, but critical steps start from steady sliding"
             remedy = (
                 "To determine whether the step of this scene triggers an instability, use the "
                 "measure triggered."

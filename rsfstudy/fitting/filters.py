@@ -180,8 +180,8 @@ class Filter:
         last = int(np.searchsorted(time, time[-1] - after, side="right"))
         if first >= last:
             rule = (
-                "must have an averaging time that is shorter than the record, "
-                f"{time[-1] - time[0]:g} s"
+                "must have an averaging time that is shorter than the duration of the record, "
+                f"which is {time[-1] - time[0]:g} s"
             )
             raise InvalidValue("filter", f"{self.kind} {self.size:g} s", rule)
         return slice(first, last)

@@ -92,12 +92,11 @@ def check_noise_model_name(noise_model_name: str) -> None:
         AUTOREGRESSIVE_NOISE_NAME,
         *(f"ar{order}" for order in range(1, MAX_AUTOREGRESSIVE_ORDER + 1)),
     ):
-        choices = (
-            WHITE_NOISE_NAME,
-            AUTOREGRESSIVE_NOISE_NAME,
-            f"ar1 to ar{MAX_AUTOREGRESSIVE_ORDER}",
+        rule = (
+            f"must be {WHITE_NOISE_NAME!r}, {AUTOREGRESSIVE_NOISE_NAME!r}, or 'ar1' to "
+            f"'ar{MAX_AUTOREGRESSIVE_ORDER}'"
         )
-        raise InvalidValue("noise", noise_model_name, "is unknown", choices=choices)
+        raise InvalidValue("noise", noise_model_name, rule)
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,10 @@ class Record:
                 raise InvalidValue("record", [*self.columns], rule, remedy=f"Pass {about.name}.")
         for name, values in self.columns.items():
             if values.shape != self.time.shape:
-                rule = f"must have {self.time.size} samples, as many as 'time'"
+                rule = (
+                    f"must have as many samples as 'time' ({self.time.size}), but has shape "
+                    f"{values.shape}"
+                )
                 raise InvalidValue(name, values.shape, rule)
             if not np.isfinite(values).all():
                 row = int(np.argmin(np.isfinite(values)))

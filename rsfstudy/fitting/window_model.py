@@ -123,8 +123,11 @@ def check_free_parameters(free: Sequence[str]) -> None:
         ...
     rsfstudy.errors.InvalidValue: ...
     """
-    if not free or len(set(free)) < len(free):
-        raise InvalidValue("free", tuple(free), "must be a list of different parameter names")
+    if not free:
+        raise InvalidValue("free", tuple(free), "must contain at least one parameter name")
+    if len(set(free)) < len(free):
+        rule = "must not contain a parameter name more than once"
+        raise InvalidValue("free", tuple(free), rule)
     for name in free:
         if name not in PARAMETERS:
             remedy = f"Write {PARAMETER_SYNONYMS[name]}." if name in PARAMETER_SYNONYMS else ""

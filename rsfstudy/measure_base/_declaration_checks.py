@@ -68,8 +68,12 @@ def check_measure_description(
         name: object = json.loads(json.dumps(describe_measure()))["name"]
     except (TypeError, ValueError) as error:
         remedy = "Use Python numbers, strings, and tuples of numbers or strings."
-        rule = f"must consist of plain data, because it is stored as JSON ({error})"
-        raise InvalidValue("measure", measure_name, rule, remedy=remedy) from error
+        raise InvalidValue(
+            f"measure {measure_name!r}",
+            ...,
+            f"must contain only plain data, because it is stored as JSON ({error})",
+            remedy=remedy,
+        ) from error
     if not isinstance(name, str):
         raise InvalidValue("name", name, "must be a string").with_location("measure")
 

@@ -46,9 +46,11 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     loading = scene.parts.loading
     if loading.unknowns:
         what = "load point velocity" if loading.has_load_point_unknown else "normal stress"
-        rule = f"changes {what} continuously, so the motion neither settles nor repeats itself"
-        remedy = (
-            "Compute the motion with rsfstudy.simulate. For an example with an oscillation, "
-            "run `rsfstudy show resonance`."
+        rule = (
+            f"cannot be used here, because it changes the {what} continuously, so the motion does "
+            "not reach a steady state or a limit cycle"
         )
+        remedy = "To compute the motion, use rsfstudy.simulate."
+        if "oscillation" in loading.name:
+            remedy += " For an example, run `rsfstudy show resonance`."
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)

@@ -41,11 +41,13 @@ _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS = (
     "sigma_star",
     "reference_velocity",
 )
+_REMEDY_FOR_ELASTICITY_OF_B = (
+    "At constant a, the elasticities with respect to b and b_over_a are equal. Pass b_over_a."
+)
 _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES = (
-    "At constant a, the elasticities with respect to b and b_over_a are equal. For a time in "
-    "s, the elasticity with respect to D_c is e_k - e_r + 1, the elasticity with respect to "
-    "normal stress is -e_k, and the elasticity with respect to V_* is e_r - 1, where e_k and "
-    "e_r are the elasticities with respect to stiffness and reference_rate."
+    "The elasticity follows from those with respect to stiffness (e_k) and reference_rate (e_r). "
+    "For a time in s, the elasticity with respect to D_c is e_k - e_r + 1, the elasticity "
+    "with respect to normal stress is -e_k, and the elasticity with respect to V_* is e_r - 1."
 )
 #: Largest finite-difference step of ln p for a parameter p. The finite-difference formula spans
 #: four steps.
@@ -172,10 +174,15 @@ class Elasticities(Measure):
                 rule = (
                     f"must not contain fields that {self.measure.name} computes"
                     if is_solved
-                    else "must only contain numeric fields of the scene"
+                    else "must contain only numeric scene fields"
                 )
                 choices, remedy = (
-                    ((), _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES)
+                    (
+                        (),
+                        _REMEDY_FOR_ELASTICITY_OF_B
+                        if name == "b"
+                        else _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES,
+                    )
                     if name in _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS
                     else (() if is_solved else self._differentiable_parameter_names, "")
                 )

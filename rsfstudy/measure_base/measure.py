@@ -32,7 +32,12 @@ from rsfstudy.motion import (
     WorkMeter,
     accept_deprecated_accuracy_and_meter,
 )
-from rsfstudy.quantities import Output, Quantity, is_valid_variable_name
+from rsfstudy.quantities import (
+    Output,
+    Quantity,
+    describe_invalid_variable_name,
+    is_valid_variable_name,
+)
 from rsfstudy.slider import Scene, SceneFields, cached_attribute
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
@@ -364,8 +369,12 @@ class Measure(ConstructorKeywordCheckMixin):
         except InvalidValue:
             raise
         except Exception as error:
-            rule = f"declares outputs that cannot be stored ({type(error).__name__}: {error})"
-            raise InvalidValue("measure", type(self).__name__, rule) from error
+            raise InvalidValue(
+                f"declaration of measure {type(self).__name__!r}",
+                ...,
+                f"is invalid and cannot be stored ({type(error).__name__}: {error})",
+                remedy="Check the outputs of the measure.",
+            ) from error
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Compute the results for one scene.
@@ -558,7 +567,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
     if not variables:
         raise InvalidValue(
             "variables", {}, "must contain at least one numeric output"
-        ).with_location(f"measure {measure.name}")
+        ).with_location(f"measure {measure.name!r}")
     if measure.primary_output not in variables:
         raise InvalidValue(
             "primary_output",
@@ -567,20 +576,23 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             choices=variables,
         )
     for name in names:
-        kind, rule = "variable", ""
+        kind, rule, remedy = "variable name", "", "Rename the variable."
         if not is_valid_variable_name(name):
-            kind, rule = "variable name", "must be a Python identifier in normalisation form NFC"
+            rule, remedy = describe_invalid_variable_name(name)
         elif name in RESERVED_NAMES - {*measure.solved_fields}:
-            rule = "has a reserved name"
+            rule = "is reserved"
         elif names.count(name) > 1:
-            rule = "is declared more than once"
+            kind, rule = "variable", "is declared more than once"
+            remedy = "Remove or rename one of the declarations."
         if rule:
-            raise InvalidValue(kind, name, rule).with_location(f"measure {measure.name}")
+            raise InvalidValue(kind, name, rule, remedy=remedy).with_location(
+                f"measure {measure.name!r}"
+            )
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
             raise InvalidValue(
                 "dimensions", dims, "must be a tuple of different names"
-            ).with_location(f"output {name}")
+            ).with_location(f"output {name!r}")
         for dim in dims:
             if dim not in measure.inner_coordinates:
                 raise InvalidValue(

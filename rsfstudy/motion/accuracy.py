@@ -111,7 +111,7 @@ class Accuracy:
         if self.methods and self.engine != SCIPY:
             rule = f"must be empty if the engine is {self.engine!r}"
             raise InvalidValue(
-                "methods", self.methods, rule, remedy="Omit methods=, or use engine='scipy'."
+                "methods", self.methods, rule, remedy="Omit 'methods', or use engine='scipy'."
             )
 
     def refined(self) -> Accuracy:

@@ -135,9 +135,12 @@ def draw_figure(
         or callable(getattr(user_figure, "draw", user_figure))
     )
     if not draws:
-        rule = "must be a Figure, or a user-defined function or module that draws"
+        rule = "must be a Figure, or a function or module that draws a figure"
         raise InvalidValue(
-            "own", user_figure, rule, remedy="Define, for example, def name(dataset, axes): ..."
+            "own",
+            user_figure,
+            rule,
+            remedy="A function must have the signature name(dataset, axes).",
         )
     dataset = DatasetUnits(dataset).convert_to_display_units()
     with style_context(style, width):

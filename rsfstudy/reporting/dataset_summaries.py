@@ -132,7 +132,7 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
     return {
         **origin_descriptions.describe_scene_and_rig_fields("scene", fields, rig),
         "command": about.get("history", "unknown"),
-        "versions": about.get("source", "unknown"),
+        "software versions": about.get("source", "unknown"),
         "status": f"{about['status']} {about.get('message', '')}".strip(),
     }
 

@@ -48,7 +48,7 @@ def describe_scene_and_rig_fields(
         nonzero_fields_heading: format_fields_except_none(
             {n: v for n, v in scene_fields.items() if v}
         ),
-        "fields with the value 0": ", ".join(
+        "fields equal to 0": ", ".join(
             n for n, v in scene_fields.items() if not v and v is not None
         ),
         "rig": format_fields_except_none({n: f"{v:g} {units}" for n, (v, units) in sizes.items()}),
@@ -110,12 +110,12 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     reduced = attrs.get("reduced_despite")
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return {
-        "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
+        "axes": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
         **describe_scene_and_rig_fields("fixed fields", scene, rig),
         "cells": f"{attrs['completeness']}; {format_status_counts(dataset)}",
         **({"reductions": reduced} if reduced else {}),
         "command": f"{about['command']}, {about['time']}",
-        "versions": f"{versions}; git {about['git']}; {about['machine']}",
+        "software versions": f"{versions}; git {about['git']}; {about['machine']}",
     }
 
 

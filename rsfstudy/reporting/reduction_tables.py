@@ -32,7 +32,7 @@ _MAX_MISSING_POINTS_SHOWN = 4
 #: Columns of the comparison of integrators.
 _INTEGRATOR_COMPARISON_COLUMNS = (
     TextTableColumn("cheapest integrator", "cheapest_integrator", str, "integrator"),
-    TextTableColumn("evaluations", "cheapest_work", "{:,.0f}".format, "work"),
+    TextTableColumn("evaluations (cheapest integrator)", "cheapest_work", "{:,.0f}".format, "work"),
     TextTableColumn(
         "evaluations (default integrator)",
         "cheapest_default_work",

@@ -224,10 +224,10 @@ def _find_column_with_common_heading(column_name: str, table: LazyTable) -> dict
     if len(meant) > 1:
         remedy = (
             f"Select one of them, for example --columns '{column_name}={meant[-1]}' "
-            f"(columns={{'{column_name}': ...}})."
+            f"or, in Python, columns={{'{column_name}': '{meant[-1]}'}}."
         )
-        rule = "matches several columns"
-        raise InvalidValue("column", column_name, rule, choices=meant, remedy=remedy).with_location(
+        rule = f"matches several headings: {', '.join(map(repr, meant))}"
+        raise InvalidValue("column", column_name, rule, remedy=remedy).with_location(
             table.heading_location
         )
     return {column_name: meant[0]} if meant else {}
@@ -261,9 +261,9 @@ def build_missing_columns_error(table: LazyTable, rule: str) -> InvalidValue:
     else:
         shown = "1 (s)", "2 (um)", "3"
     remedy = (
-        "Select the columns, for example --columns "
-        f"'time={shown[0]},displacement={shown[1]},friction={shown[2]}', or columns={{'time': "
-        f"'{shown[0]}', 'displacement': '{shown[1]}', 'friction': '{shown[2]}'}}."
+        "If the columns have other headings, select them, for example --columns "
+        f"'time={shown[0]},displacement={shown[1]},friction={shown[2]}' or, in Python, "
+        f"columns={{'time': '{shown[0]}', 'displacement': '{shown[1]}', 'friction': '{shown[2]}'}}."
     )
     header = ", ".join(table.headings)[:200]
     if not table.has_headings:

@@ -10,9 +10,12 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.units import parse_number
 
-_RANGE_SYNTAX_RULE = "must have the form start:stop:count, with two finite numbers and a count"
+_RANGE_SYNTAX_RULE = (
+    "must contain a range of the form start:stop:count, where start and stop are finite numbers "
+    "and count is a whole number"
+)
 _LOG_RANGE_SYNTAX_REMEDY = (
-    "For logarithmic spacing, write start:stop:count:log, for example hold_time=1:1e5:30:log."
+    "For logarithmic spacing, append :log, for example hold_time=1:1e5:30:log."
 )
 _MAX_POINTS_OF_RANGE = 1_000_000
 
@@ -63,14 +66,14 @@ def _expand_range_without_units(
         raise InvalidValue(
             argument_name,
             argument_text,
-            f"{_RANGE_SYNTAX_RULE}, from 1 to {_MAX_POINTS_OF_RANGE:,}",
+            f"{_RANGE_SYNTAX_RULE} from 1 to {_MAX_POINTS_OF_RANGE:,}",
         )
     if spacing and min(first, last) <= 0.0:
-        remedy = "Remove :log, or use positive limits."
+        remedy = "Use positive values, or remove :log."
         raise InvalidValue(
             argument_name,
             argument_text,
-            "must have positive limits for logarithmic spacing",
+            "must have positive start and stop values for logarithmic spacing",
             remedy=remedy,
         )
     laid = np.geomspace if spacing else np.linspace

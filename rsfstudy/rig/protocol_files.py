@@ -152,7 +152,10 @@ def history(
         ones, none = np.ones(len(time)), np.zeros(len(time))
         fall = values.get("pore_pressure", none) - (values.get("normal_stress", ones) - 1.0)
         key = "normal_stress" if "normal_stress" in found else "pore_pressure"
-        rule = "must keep the effective normal stress (normal stress minus pore pressure) positive"
+        rule = (
+            f"is too {'low' if key == 'normal_stress' else 'high'}, because the effective normal "
+            "stress (normal stress minus pore pressure) must be positive"
+        )
         found[key].raise_for_invalid_values(key, fall >= 1.0, rule)
     of_pressure = "pore_pressure" in found and "normal_stress" not in found
     return SampledHistory.from_samples(

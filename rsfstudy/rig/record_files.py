@@ -199,7 +199,7 @@ def _add_derived_columns(
         stress = values_by_column.get("normal_stress")
         if stress is None:
             rule = f"has no column for normal stress (columns: {', '.join(values_by_column)})"
-            remedy = "Pass --normal-stress (normal_stress=), for example '20 MPa'."
+            remedy = "Pass --normal-stress (in Python, normal_stress=), for example '20 MPa'."
             raise InvalidValue("record", ..., rule, remedy=remedy)
         check_normal_stress_is_positive(stress)
         values_by_column["friction"] = values_by_column["shear_stress"] / stress
@@ -276,6 +276,9 @@ def _compute_load_point_displacement(
     if over_stress:
         return np.asarray(values_by_column["slip"] + friction / per_um)
     if stress is None:
-        remedy = "Pass --normal-stress (normal_stress=), or the stiffness in 1/um."
+        remedy = (
+            "Pass the normal stress with --normal-stress (in Python, normal_stress=), or pass the "
+            "stiffness in 1/um."
+        )
         raise InvalidValue("stiffness", stiffness, "requires a normal stress", remedy=remedy)
     return np.asarray(values_by_column["slip"] + friction * stress / per_um)

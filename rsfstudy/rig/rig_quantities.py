@@ -262,8 +262,8 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
     missing = [n for n in REQUIRED_SHEAR_HEATING_QUANTITIES if n not in rig_values]
     if given and missing:
         rule = (
-            f"requires {', '.join(missing)}, because all of these quantities determine "
-            "shear heating"
+            f"requires {', '.join(missing)}, because shear heating depends on all of "
+            "these quantities"
         )
         remedy = "Pass these quantities as well, or omit all quantities of shear heating."
         raise InvalidValue(given[0], rig_values[given[0]], rule, remedy=remedy)

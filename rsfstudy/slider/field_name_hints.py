@@ -26,9 +26,9 @@ _SIMULATION_DURATION_HINT = "Pass the duration to rsfstudy.simulate(scene, durat
 def _hint_for_rig_quantity(symbol: str, rig_quantity_name: str) -> str:
     """Return an error hint for a rig quantity that is not a scene field."""
     return (
-        f"The quantity {symbol} belongs to a rig. Pass Rig({rig_quantity_name}=...). In "
-        "a study with a rig, "
-        f"{rig_quantity_name} can also be an axis or an override."
+        f"{symbol} is the rig parameter {rig_quantity_name}. Pass it as "
+        f"Rig({rig_quantity_name}=...). In a study with a rig, {rig_quantity_name} can also be an "
+        "axis or an override."
     )
 
 

@@ -461,10 +461,7 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
             raise InvalidValue(field_name, value, rule)
         return bool(value)
     if flagged or not isinstance(value, Real):
-        has_units = isinstance(value, str) and value.strip()[:1].isdigit()
-        remedy = (
-            "To use values with units, create the scene with rsfstudy.Rig(...).scene(...)."
-        ) * has_units
+        remedy = _suggest_number_format(value) if isinstance(value, str) else ""
         raise InvalidValue(field_name, value, "must be a number", remedy=remedy)
     try:
         plain = float(value)
@@ -506,3 +503,17 @@ def discover_parts(package_name: str, package_path: Iterable[str]) -> dict[str, 
 
 if not TYPE_CHECKING:
     __getattr__ = build_getattr_for_former_names(__name__)
+
+
+def _suggest_number_format(text: str) -> str:
+    """Return a remedy for a string that begins with a digit, but is not a number."""
+    if not text.strip()[:1].isdigit():
+        return ""
+    if "," in text:
+        return "Use a decimal point, for example 1.4."
+    if " " in text.strip() or any(c.isalpha() for c in text):
+        return (
+            "To use values with units, define a rig, and create the scene with Rig.scene, or pass "
+            "the rig to the study."
+        )
+    return "Pass a number instead of a string, for example 1.4."

@@ -187,7 +187,7 @@ def _select_part_for_slot(slot: PartSlot, field_values: Mapping[str, Any]) -> Us
         return slot.built_in_parts[name]
     if value is not None:
         others = ", ".join(slot.part_class_by_selecting_field) or "the other fields"
-        remedy = f"Built-in loadings are not selected by name. Set one of the fields {others}."
+        remedy = f"To select a built-in loading, set its field: {others}."
         raise InvalidValue(slot.name, value, "is unknown", choices=slot.user_parts, remedy=remedy)
     for caller, part in slot.part_class_by_selecting_field.items():
         value = field_values.get(caller)
@@ -343,7 +343,7 @@ def _build_unknown_field_error(name: str, value: Any, field_index: FieldIndex) -
             rule = f"does not apply to {slot.name}={part.name!r}"
             remedy = f"Omit {name}, or set {slot.name}={owner.name!r}."
             return InvalidValue(name, value, rule, remedy=remedy)
-    remedy, rule = hint_for_unknown_field(name), "is not a field of a scene"
+    remedy, rule = hint_for_unknown_field(name), "is not a scene field"
     # If the name is a known synonym of a field, a list of similar names would be misleading.
     return InvalidValue(
         "field", name, rule, choices=() if remedy else field_index.all_field_names, remedy=remedy

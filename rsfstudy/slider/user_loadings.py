@@ -255,13 +255,12 @@ def _build_validated_segment(
 ) -> Segment:
     """Return a ``Segment`` whose values have been validated."""
     if not _is_real_number(velocity) or not math.isfinite(velocity):
-        remedy = "Use 0 to hold the load point."
-        raise InvalidValue("velocity", velocity, "must be a finite number", remedy=remedy)
+        raise InvalidValue("velocity", velocity, "must be a finite number")
     if not _is_real_number(displacement_step) or not math.isfinite(displacement_step):
         raise InvalidValue("step", displacement_step, "must be a finite number")
     if not _is_real_number(duration) or not duration > 0.0:
-        remedy = "Remove segments with zero duration."
-        raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
+        remedy = "Remove segments with zero duration." if duration == 0.0 else ""
+        raise InvalidValue("duration", duration, "must be a positive number", remedy=remedy)
     if not _is_real_number(normal_stress) or not -1.0 < normal_stress < math.inf:
         rule = "must be greater than -1, because it is the imposed normal stress minus sigma_*"
         raise InvalidValue("normal_stress", normal_stress, rule)

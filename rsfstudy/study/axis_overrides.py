@@ -38,10 +38,10 @@ def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
     )
     for point in labels_or_numbers:
         if point not in rows:
-            rule, choices = "is not a point of the axis", axis.labels or ()
+            rule, choices = f"does not exist on axis {axis.dimension!r}", axis.labels or ()
             if axis.has_numbered_points:
                 rule += f". The points are numbered from 0 to {len(axis) - 1}"
-            raise InvalidValue(axis.dimension, point, rule, choices=choices)
+            raise InvalidValue("point", point, rule, choices=choices)
     if axis.labels is not None:
         return Axis(axis.dimension, {label: rows[label] for label in labels_or_numbers}, axis.units)
     first = list(labels_or_numbers) == list(range(len(labels_or_numbers)))

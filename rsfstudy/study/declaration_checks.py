@@ -103,7 +103,7 @@ def check_name_clashes(
         for name in (axis.dimension, *axis.fields):
             if name in taken:
                 remedy = "Rename the result or the field of the axis."
-                raise InvalidValue("axis", name, "has the name of a result", remedy=remedy)
+                raise InvalidValue("axis", name, "has the same name as a result", remedy=remedy)
 
 
 def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:
@@ -187,10 +187,8 @@ def check_axis_fields_and_units(
     known = dict.fromkeys((*scene_field_names, *measure.plain_fields, *in_units))
     for axis in axes:
         if not axis.varies_single_field and axis.dimension in (*scene_field_names, *axis.fields):
-            rule = (
-                "has the name of a field, but the name of a zipped axis must differ from all fields"
-            )
-            raise InvalidValue("axis", axis.dimension, rule)
+            rule = "has the same name as a field, which is not permitted for a zipped axis"
+            raise InvalidValue("axis", axis.dimension, rule, remedy="Rename the axis.")
         if axis.units and axis_unit_converter is None:
             remedy = "Pass the rig to the study: Study(rig=rig)."
             raise InvalidValue(
@@ -199,8 +197,8 @@ def check_axis_fields_and_units(
         for name in axis.fields:
             if name not in known:
                 rule = (
-                    "is neither a field of a scene nor a number, flag or string field of the "
-                    f"{measure.name} measure"
+                    "is unknown. The name must be a scene field, or a field of the "
+                    f"{measure.name} measure that is a number, a flag or a string"
                 )
                 raise build_unknown_name_error("field", name, rule, known)
 
@@ -230,11 +228,12 @@ def check_outputs_are_same_in_all_cells(
             present = measure.plain_fields.items()
             guilty = [n for n, v in changed.plain_fields.items() if (n, v) not in present]
             rule = (
-                "determines which results are computed, but all cells of a study must have "
-                "the same results"
+                "cannot vary along an axis, because it determines which variables are computed, "
+                "and all cells of a study must compute the same variables"
             )
-            remedy = "Create a separate study for each value."
-            raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
+            names = ", ".join(guilty)
+            remedy = f"Create a separate study for each value of {names!r}."
+            raise InvalidValue("field", names, rule, remedy=remedy)
 
 
 def check_field_is_set_at_all_axis_points(
@@ -314,8 +313,9 @@ def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
             for n in (axis.dimension, *axis.fields)
         }:
             if name in taken:
-                rule = f"varies {name!r}, which the axis {taken[name]!r} already varies"
-                raise InvalidValue("axis", axis.dimension, rule)
+                rule = f"varies the field {name!r}, which axis {taken[name]!r} already varies"
+                remedy = "Remove one of the two axes."
+                raise InvalidValue("axis", axis.dimension, rule, remedy=remedy)
             taken[name] = axis.dimension
 
 

@@ -309,17 +309,17 @@ def check_is_figure(figure_or_name: Any) -> None:
     if not hasattr(figure_or_name, "__name__") or not callable(
         getattr(figure_or_name, "draw", figure_or_name)
     ):
-        rule = (
-            "must be a figure name, a Figure, or a user-defined function or module that "
-            "draws a figure"
-        )
+        rule = "must be a figure name, a Figure, or a function or module that draws a figure"
         raise InvalidValue(
-            "plot", figure_or_name, rule, remedy="Define, for example, def name(dataset, axes): ..."
+            "plot",
+            figure_or_name,
+            rule,
+            remedy="A function must have the signature name(dataset, axes).",
         )
     name = get_figure_name_for_declaration(figure_or_name, "")
     if not is_valid_variable_name(name):
         rule = "must have a name that is a Python identifier"
         raise InvalidValue("plot", name, rule, remedy="Define the figure with def.")
     if name in BUILT_IN_FIGURE_NAMES or name in list_study_names():
-        rule = "must have a name that differs from the figures of rsfstudy"
+        rule = "must not have the name of a built-in figure"
         raise InvalidValue("plot", name, rule, remedy="Rename the function or module.")

@@ -199,7 +199,8 @@ class Study:
                 raise InvalidValue(
                     name,
                     value,
-                    f"must consist of plain data, because the study is stored as JSON ({error})",
+                    f"must contain only plain data, because the study is stored as JSON ({error})",
+                    remedy="Use Python numbers, strings, and tuples of numbers or strings.",
                 ) from error
 
     @staticmethod
@@ -587,7 +588,7 @@ class Study:
                 [field_name], _build_axis_rows_of_override(field_name, values)
             )
         ):
-            rule = "is neither an axis nor a field of the scene or of the measure"
+            rule = "is unknown. The name must be an axis, a scene field or a measure field"
             raise declaration_checks.build_unknown_name_error("override", field_name, rule, known)
         declaration_checks.check_fields_not_solved_by_measure(self.measure, [field_name])
         if is_sequence_of_axis_values(value):

@@ -91,7 +91,8 @@ class CheckCommandResult(CommandResult):
     "claims",
     multiple=True,
     metavar="ID",
-    help="Check only this claim. The claim must apply to the results. Example: C6.",
+    help="Check only the claim with this ID, which must be a claim about the given results. "
+    "Example: C6.",
 )
 @options.json_option
 def check(command_options: options.CommandOptions) -> int:

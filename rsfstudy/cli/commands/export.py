@@ -23,14 +23,14 @@ _QUANTITY_ORDER_IN_UNITS_OPTION = ("stress", "length", "time")
     "--units",
     nargs=3,
     metavar="STRESS LENGTH TIME",
-    help="Convert the values to these units. The results must belong to a rig. Example: "
-    "--units MPa um s.",
+    help="Convert the values to these units. This option requires results that were "
+    "computed with a rig. Example: --units MPa um s.",
 )
 @click.option(
     "--output",
     type=options.PathParameterType(dir_okay=False),
-    help="Output path. The suffix is replaced by .csv or .mat.  [default: path of FILE with "
-    "the new suffix]",
+    help="Path of the output file. The suffix is replaced by .csv or .mat.  [default: path of "
+    "the input file with the new suffix]",
 )
 def export(command_options: options.CommandOptions) -> int:
     """Export results or a motion to other programs.

@@ -18,9 +18,9 @@ from rsfstudy.errors import InvalidValue
 @click.command(cls=CommandWithOptionsObject)
 @options.study_name_or_all_argument
 @options.make_output_option(
-    "Directory that contains the results and receives the figure, or path of a single figure. "
-    "Example: fig.pdf.  [default: outputs if NAME is a study, the directory of the file if "
-    "NAME is a file]"
+    "Directory that contains the results and to which the figure is written, or path of a single "
+    "figure. Example: fig.pdf.  [default: the directory 'outputs' if NAME is a study, or the "
+    "directory of NAME if NAME is a file]"
 )
 @options.figure_options
 @click.option(
@@ -101,8 +101,10 @@ def _find_figure_path_in_output_option(command_options: options.CommandOptions) 
         return None
     if ending in Defaults.FIGURE_FORMATS:
         if command_options.every or command_options.form not in (None, ending):
-            rule = "is the path of a single figure. Omit --all and --figure, or pass a directory."
-            raise click.UsageError(f"{output} {rule}")
+            raise click.UsageError(
+                f"--output {str(output)!r} is the path of a single figure, which determines the "
+                "figure format. Pass a directory, or omit --all and --figure."
+            )
         check_regular_file("--output", output)
         return output
     if not output.is_dir():

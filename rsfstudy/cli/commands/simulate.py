@@ -43,8 +43,8 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 @click.option(
     "--duration",
     metavar="QUANTITY",
-    help="Duration of the motion. If a rig is defined, the duration has units or is in s. "
-    "Otherwise, the duration is in D_c/V_*. Example: '100 s'.  [default: duration of the "
+    help="Duration of the motion. With a rig, pass a value with units, or a number in s. Without "
+    "a rig, pass a number in units of D_c/V_*. Example: '100 s'.  [default: duration of the "
     "protocol if there is one, otherwise 50]",
 )
 @options.abscissa_option

@@ -99,7 +99,7 @@ def _convert_answer_comparison_to_json(file: Path, comparison: AnswerComparison)
     type=click.FloatRange(1.0, 12.0),
     metavar="N",
     default=6.0,
-    help="Number of correct digits that a file must have to pass.",
+    help="Minimum number of correct digits for a file to pass the check.",
 )
 @options.make_image_path_option(
     "--figure",

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.formatting import format_count_with_noun
 from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
 from rsfstudy.rig.readers.text_layout import (
     COMMENT_LINE_PREFIXES,
@@ -256,7 +257,7 @@ def _check_row_lengths(rows: _TextFileRows, layout: TextLayout, file_name: str) 
         while len(row) > size and not row[-1].strip():
             row.pop()
         if len(row) != size:
-            rule = f"must have as many fields as the header ({size}), but has {len(row)}"
+            rule = f"has {format_count_with_noun(len(row), 'field')}, but the header has {size}"
             remedy = (
                 "Use decimal points, or pass decimal=',' (--decimal ',')."
                 if len(row) > size
@@ -312,7 +313,10 @@ class _FieldToNumberConverter(NamedTuple):
         )
         found = parse_number(pointed)
         if found is None:
-            remedy = "Write only a number, for example 1.5e-3, and write the units in the header."
+            remedy = (
+                "Use only the digits 0 to 9, a decimal point and an exponent, for example 1.5e-3. "
+                "Write the units in the header."
+            )
             if "," in field_text:
                 remedy = "Use a decimal point, or pass decimal=',' (--decimal ',')."
             wrong = InvalidValue(self.quantity_name, field_text, "is not a number", remedy=remedy)

@@ -204,7 +204,10 @@ class DilatantFluid(Fluid):
         """
         check_porosity_length(self, scene)
         if lacks_critical_stiffness(scene):
-            rule = f"gives no critical stiffness with dilatancy = {self.dilatancy:g}"
+            rule = (
+                "cannot be used with stiffness_ratio, because no critical stiffness exists for "
+                f"this value and dilatancy = {self.dilatancy:g}"
+            )
             raise self.build_field_error(
                 "drainage", rule, "Pass stiffness instead of stiffness_ratio, or increase drainage."
             )

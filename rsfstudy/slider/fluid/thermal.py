@@ -192,7 +192,10 @@ class ThermalFluid(Fluid):
         if self.dilatancy:
             check_porosity_length(self, scene)
         if lacks_critical_stiffness(scene):
-            rule = "gives no critical stiffness with thermal pressurisation"
+            rule = (
+                "cannot be used with stiffness_ratio, because no critical stiffness exists for "
+                "this value with thermal pressurisation"
+            )
             raise self.build_field_error(
                 "drainage", rule, "Pass stiffness instead of stiffness_ratio, or increase drainage."
             )

@@ -72,8 +72,8 @@ def declare_cutoff_velocity_field() -> Any:
         "1",
         "cut-off velocity of the evolution effect",
         rule=POSITIVE,
-        remedy="If evolution should not have a cut-off velocity, choose a law other than "
-        "cut_off and composite.",
+        remedy="For state evolution without a cut-off velocity, choose a law other than "
+        "'cut_off' or 'composite'.",
     )
 
 
@@ -268,15 +268,16 @@ class LawBase(Part):
         if fluid.unknowns:
             unknown = f"fluid={fluid.name!r}"
         if not unknown and scene.changes_normal_stress:
-            unknown = "loadings that change normal stress"
+            unknown = "a loading that changes normal stress"
         if self.stress_dependence and unknown:
             rule = (
-                "requires normal stress that is proportional to shear stress, which is not "
-                f"the case for {unknown}"
+                "can only be used if the normal stress is proportional to the shear stress, which "
+                f"is not the case for {unknown}"
             )
             remedy = (
-                "Omit stress_dependence. If you wrote the normal stress class, and the ratio of "
-                "both stresses is constant, define the property coupling in the class."
+                "Omit stress_dependence. If you use your own normal stress class, and the ratio of "
+                "normal stress to shear stress is constant, define the property 'coupling' in that "
+                "class."
             )
             raise self.build_field_error("stress_dependence", rule, remedy)
         pressed = source.unknowns and not loading.has_load_point_unknown
@@ -286,9 +287,11 @@ class LawBase(Part):
             source if pressed else None if scene.dynamics.allows_reversed_slip else scene.dynamics
         )
         if self.regularised and one_way:
+            parts, slots = scene.parts, ("loading", "fluid", "temperature")
+            slot = next((s for s in slots if getattr(parts, s) is one_way), "")
             rule = (
-                f"cannot be combined with {one_way.name!r}, because the equations of "
-                f"{one_way.name!r} contain ln V and therefore require forward slip"
+                f"cannot be combined with {slot}{'=' * bool(slot)}{one_way.name!r}, because the "
+                "corresponding equations contain ln V and are therefore valid for forward slip only"
             )
             raise self.build_field_error("regularised", rule, "Omit one of the two.")
 

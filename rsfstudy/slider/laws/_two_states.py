@@ -151,7 +151,8 @@ class TwoStateLaw(LawBase):
             )
         if lacks_critical_stiffness(scene):
             rule = (
-                f"gives no critical stiffness with b1_over_a = {self.b1_over_a:g} and "
+                "cannot be used with stiffness_ratio, because no critical stiffness exists for "
+                f"this value, b1_over_a = {self.b1_over_a:g} and "
                 f"length_ratio = {self.length_ratio:g}"
             )
             raise self.build_field_error("b2_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)

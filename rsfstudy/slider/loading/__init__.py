@@ -156,10 +156,10 @@ class Loading(Part):
             self._check_segment_durations()
         fluid, name = scene.parts.fluid, self.selecting_field_name
         if self.unknowns and fluid.unknowns and not self.of_pressure:
-            rule = f"does not apply to fluid={fluid.name!r}"
-            rule += ", because the pore pressure already changes the effective normal stress"
+            rule = f"cannot be combined with fluid={fluid.name!r}"
+            rule += ", because both change the effective normal stress"
             value = getattr(self, name or "name")
-            remedy = "Omit one of the two."
+            remedy = f"Omit {name or 'loading'} or fluid."
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
 
     def _check_segment_durations(self) -> None:
@@ -167,8 +167,10 @@ class Loading(Part):
         for n, (begins, ends, *_others) in enumerate(self.segment_table):
             if ends - begins < MIN_SEGMENT_DURATION and ends > 0.0:
                 least = f"{MIN_SEGMENT_DURATION:g} D_c/V_*"
-                rule = f"must be at least {least}, and larger than the rounding error of the time"
-                remedy = "Remove segments whose duration is zero."
+                rule = (
+                    f"must be at least {least}, and large enough to change the time after rounding"
+                )
+                remedy = "Remove the segment, or increase its duration."
                 wrong = InvalidValue("duration", self.segments[n].duration, rule, remedy=remedy)
                 raise wrong.with_location(f"segment {n + 1}")
 

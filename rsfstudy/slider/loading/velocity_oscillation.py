@@ -75,8 +75,8 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         """
         if (self.velocity_oscillation or 0.0) > 1.0 and not scene.parts.law.regularised:
             rule = (
-                "must be 1 or less, because the load point would move backwards, and friction "
-                "is defined for forward slip only"
+                "must be 1 or less, because at larger values the load point moves backwards, but "
+                "friction is defined for forward slip only"
             )
             remedy = "Set regularised=True, which permits reversed slip."
             raise self.build_field_error("velocity_oscillation", rule, remedy)

@@ -127,7 +127,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
         """
         if self.phi >= 90.0:
             remedy = "For constant normal stress (90 degrees), set normal_stress='constant'."
-            raise self.build_field_error("phi", "must lie between 0 and 90 degrees", remedy)
+            raise self.build_field_error("phi", "must be less than 90 degrees", remedy)
         lowest = math.degrees(math.atan(scene.mu_star))
         if self.phi <= lowest:
             rule = (

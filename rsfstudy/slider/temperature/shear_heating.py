@@ -200,7 +200,10 @@ class ShearHeating(Temperature):
                     "heating", rule, "Decrease heating, or increase cooling."
                 )
         if lacks_critical_stiffness(scene):
-            rule = "gives no critical stiffness at V_*"
+            rule = (
+                "cannot be used with stiffness_ratio, because no critical stiffness exists for "
+                "this value at V_*"
+            )
             raise self.build_field_error(
                 "heating", rule, "Pass stiffness instead of stiffness_ratio, or increase cooling."
             )
