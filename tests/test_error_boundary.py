@@ -189,7 +189,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         ),
         (
             lambda r: reductions.Mean("z", of="x").compute_value_and_stderr(ARRAY),
-            "'sample_values' has no dimension 'sample' .got <DataArray>.. Ch",
+            "sample_values has no dimension 'sample' .got <DataArray>.. Ch",
         ),
         (lambda r: PowerLaw("z", of="x", on="y").centre_values(ARRAY, "y"), "has no dimension 'y'"),
         (

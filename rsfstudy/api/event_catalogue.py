@@ -253,8 +253,10 @@ def events(
     moves = None if moved is None else _convert_samples_to_finite_array("displacement", moved)
     for name, samples in (("shear_stress", stress), ("displacement", moves)):
         if samples is not None and len(samples) != len(times):
-            rule = f"must have as many samples as 'time' ({len(times)})"
-            raise InvalidValue(name, len(samples), rule)
+            rule = (
+                f"must have as many samples as 'time' (got {len(samples)} instead of {len(times)})"
+            )
+            raise InvalidValue(name, ..., rule)
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
         rule = f"must increase, but does not increase at sample {late}"
@@ -346,7 +348,7 @@ def _convert_samples_to_finite_array(variable_name: str, values: Any) -> np.ndar
             f"must be one-dimensional with at least {MIN_SAMPLES} samples (got an array of "
             f"shape {samples.shape}), because the noise is estimated from the samples"
         )
-        raise InvalidValue(variable_name, samples.shape, rule)
+        raise InvalidValue(variable_name, ..., rule)
     if not np.isfinite(samples).all():
         late = int(np.argmin(np.isfinite(samples)))
         raise InvalidValue(

@@ -272,7 +272,7 @@ def parse_axis_assignment(text: str, axis_labels: Collection[str]) -> tuple[str,
     parts = [part.strip().replace("\0", ",") for part in values.split(",")]
     if not all(parts):
         remedy = "Write a value between the commas, or remove one comma."
-        raise InvalidValue("--set", text, "contains an empty value", remedy=remedy)
+        raise InvalidValue(f"--set {text!r}", ..., "contains an empty value", remedy=remedy)
     if len(parts) > 1:
         return name, [parse_boolean_number_or_text(part) for part in parts]
     return name, expand_range(

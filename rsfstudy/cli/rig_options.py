@@ -28,7 +28,7 @@ EXAMPLE_VALUES_OF_RIG_OPTIONS = {
 #: is not imported, because the import would delay the start of every command.
 MEANINGS_OF_RIG_OPTIONS = {
     "normal_stress": "normal stress",
-    "slip_distance": "characteristic slip distance D_c",
+    "slip_distance": "slip distance",
     "reference_velocity": "velocity of the load point before the test",
     "stiffness": "stiffness of the machine with its sample",
     "period": "period of free oscillation",
@@ -42,7 +42,7 @@ MEANINGS_OF_RIG_OPTIONS = {
     "heat_loss_width": "distance over which heat is conducted away",
     "direct_activation_energy": "activation energy of the direct effect",
     "evolution_activation_energy": "activation energy of the evolution effect",
-    "pressurisation_factor": "undrained change of pore pressure per change of temperature",
+    "pressurisation_factor": "change of undrained pore pressure per change of temperature",
     "load_velocity": "load point velocity",
 }
 

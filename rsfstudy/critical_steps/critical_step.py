@@ -239,7 +239,7 @@ class CriticalStep(Measure):
             rule = "is not a steady state, but critical steps start from steady sliding"
             remedy = (
                 "To determine whether the step of this scene triggers an instability, use the "
-                "measure triggered."
+                "'triggered' measure."
             )
             raise InvalidValue("initial_state", scene.initial_state, rule, remedy=remedy)
         sign = 1 if self.direction == "up" else -1

@@ -110,10 +110,10 @@ class Record:
         for name, values in self.columns.items():
             if values.shape != self.time.shape:
                 rule = (
-                    f"must have as many samples as 'time' ({self.time.size}), but has shape "
-                    f"{values.shape}"
+                    f"must have as many samples as 'time' (got an array of shape {values.shape} "
+                    f"instead of {self.time.shape})"
                 )
-                raise InvalidValue(name, values.shape, rule)
+                raise InvalidValue(name, ..., rule)
             if not np.isfinite(values).all():
                 row = int(np.argmin(np.isfinite(values)))
                 remedy = "Remove such rows from the record."

@@ -516,4 +516,6 @@ def _suggest_number_format(text: str) -> str:
             "To use values with units, define a rig, and create the scene with Rig.scene, or pass "
             "the rig to the study."
         )
-    return "Pass a number instead of a string, for example 1.4."
+    if text.isascii() and text.replace(".", "").isdigit():
+        return "Pass a number instead of a string."
+    return "Write only the digits 0 to 9 and a decimal point, for example 1.4."
