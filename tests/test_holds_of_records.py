@@ -185,7 +185,7 @@ def test_fit_counts_the_error_of_a_measured_stiffness(monkeypatch: pytest.Monkey
 
 def test_fit_uses_the_stiffness_of_the_record() -> None:
     flat = synthetic.synthetic_record()
-    with pytest.raises(InvalidValue, match="portion of the record in which the fault is locked"):
+    with pytest.raises(InvalidValue, match="part of the record in which the fault is locked"):
         rsfstudy.fit(flat, stiffness="from record", laws=["slowness"])
     held = synthetic.synthetic_record(synthetic.SLIDE_HOLD_SLIDE, size=1e-4)
     ratio, machine, spread = record_fitting._measure_stiffness_in_records([held])

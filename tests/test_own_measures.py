@@ -128,7 +128,8 @@ def test_a_measure_states_its_outputs_once(tmp_path):
 )  # fmt: skip
 def test_inner_coordinates_that_are_none(values):
     with pytest.raises(
-        InvalidValue, match="^'x' must |^measure = 'Own' declares outputs that cannot be stored"
+        InvalidValue,
+        match="^'x' must |^declaration of measure 'Own' is invalid and cannot be stored",
     ):
         study(along(values))
 

@@ -364,7 +364,7 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
         ({"filter": "median 1 s"}, "filter = 'median 1 s' is unknown. .*mean, trailing_mean"),
         (
             {"filter": "mean 20 s"},
-            "must have an averaging time that is shorter than the record, 9.75 s",
+            "averaging time that is shorter than the duration of the record, which is 9.75 s",
         ),
         ({"filter": "first_order 3 Hz"}, "only contains frequencies below 2 Hz"),
         ({"filter": "first_order 3 s"}, "has units that are incompatible"),

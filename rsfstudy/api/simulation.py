@@ -217,7 +217,8 @@ def simulate(
     known = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
     if not (known and 0.0 < duration < math.inf):
         rule, remedy = "must be a positive, finite number in units of D_c/V_*", ""
-        if isinstance(duration, str):
+        given: object = duration
+        if isinstance(given, str):
             rule = "must be a number in units of D_c/V_*"
             remedy = "To convert a duration with units, use rig.dimensionless."
         raise InvalidValue("duration", duration, rule, remedy=remedy)
