@@ -134,7 +134,7 @@ def test_list_and_show():
         assert f"{name} {study.title}" in said
     shown = call_main("show", NAME, "--set", "b_over_a=2,3")
     assert shown.returncode == 0
-    assert ["cells", "6"] in [line.split() for line in shown.stdout.splitlines()]
+    assert ["number", "of", "cells", "6"] in [line.split() for line in shown.stdout.splitlines()]
     assert "right-hand-side evaluations" in shown.stdout
 
 
