@@ -327,7 +327,7 @@ def test_a_scene_of_ones_own_parts():
         ({"law": "slip", "factor": 2.0}, "factor = 2.0 does not apply to law='slip'.*'doubled'"),
         ({"law": Doubled, "factor": -1.0}, "'factor' must be 0 or greater"),
         ({"law": "doubeld"}, "law = 'doubeld' is unknown. Did you mean 'doubled'"),
-        ({"dynamics": Sticky, "inertia": True}, "inertia = True does not apply to sticky"),
+        ({"dynamics": Sticky, "inertia": True}, "inertia = True does not apply to 'sticky'"),
         (
             {"law": Sticky},
             "law = .*is not a class that defines the law of a scene. Derive a class from",
