@@ -22,6 +22,7 @@ _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60,
 #: Kinds of objects that an error message identifies by name, as in "column 'speed' is unknown".
 _KINDS_OF_NAMED_OBJECTS = frozenset(
     {"axis", "column", "dimension", "directory", "field", "header", "heading", "key", "line"}
+    | {"measure"}
     | {"override", "problem", "reduction", "segment", "sheet", "study", "table", "variable"}
 )
 #: Maximum number of characters of a message.
@@ -122,9 +123,9 @@ class InvalidValue(RsfStudyError, ValueError):
             for c in choices[:_MAX_COMPARED_CHOICES]
             if len(c) <= _MAX_CHOICE_LENGTH_FOR_SUGGESTION
         ]
-        close = difflib.get_close_matches(shown.strip("'\""), compared, n=3, cutoff=0.5)
+        close = difflib.get_close_matches(shown.strip("'\""), compared, n=3, cutoff=0.6)
         if close:
-            text += f" Did you mean {' or '.join(map(repr, close))}?"
+            text += f" Did you mean {_format_alternatives(close)}?"
         if choices and not (
             close and (len(choices) > _MAX_CHOICES_WITH_SUGGESTIONS or len(choices) == len(close))
         ):
@@ -235,10 +236,10 @@ def _format_violation(name: str, value: object, shown_value: str, rule: str) -> 
     if value is ... or (value is None and rule.startswith(("is required", "is missing"))):
         return f"{subject} {rule}."
     is_short = value is None or isinstance(value, str | Number) or callable(value)
-    if (rule.startswith("must ") or not is_short) and "(got " not in rule:
+    if (rule.startswith(("must ", "accepts ")) or not is_short) and "(got " not in rule:
         requirement, conjunction, reason = rule.partition(", because")
         return f"{subject} {requirement} (got {shown_value}){conjunction}{reason}."
-    if name == "field" and rule.startswith(("is not a field", "is neither a field")):
+    if name == "field" and rule.startswith(("is not a field", "is not a scene field")):
         return f"{shown_value} {rule}."
     relation = " " if is_kind and isinstance(value, str) else " = "
     return f"{name}{relation}{shown_value} {rule}."

@@ -516,7 +516,9 @@ def test_overrides_by_class_whatever_their_order():
                   study.with_(law=[Doubled]).with_(factor=[1.0, 2.0])):  # fmt: skip
         assert {cell.scene.factor for cell in other.cells()} == {1.0, 2.0}
         assert other.describe()["overrides"]["law"] in ("doubled", ["doubled"])
-    with pytest.raises(InvalidValue, match="override 'factor' is neither an axis nor a field"):
+    with pytest.raises(
+        InvalidValue, match="override 'factor' is not an axis, a scene field or a field"
+    ):
         study.with_(factor=[1.0])
 
 

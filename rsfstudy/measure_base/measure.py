@@ -350,10 +350,10 @@ class Measure(ConstructorKeywordCheckMixin):
         try:
             for name in ("__call__", "run_nested", "run_metered"):
                 if getattr(type(self), name) is not getattr(Measure, name):
-                    rule = f"overrides {name}"
+                    rule = f"overrides {name}()"
                     remedy = (
-                        "Override compute instead, because the base class checks the result "
-                        "of compute."
+                        "Override compute() instead, because the base class checks the result "
+                        "of compute()."
                     )
                     raise InvalidValue("measure", self.name, rule, remedy=remedy)
             _check_names_declared_by_measure(self)
@@ -558,7 +558,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
     if not variables:
         raise InvalidValue(
             "variables", {}, "must contain at least one numeric output"
-        ).with_location(f"measure {measure.name}")
+        ).with_location(f"measure {measure.name!r}")
     if measure.primary_output not in variables:
         raise InvalidValue(
             "primary_output",
@@ -575,12 +575,15 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
         elif names.count(name) > 1:
             rule = "is declared more than once"
         if rule:
-            raise InvalidValue(kind, name, rule).with_location(f"measure {measure.name}")
+            raise InvalidValue(kind, name, rule).with_location(f"measure {measure.name!r}")
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
+            remedy = (
+                f"For one dimension, write ({dims!r},)." if type(dims).__name__ == "str" else ""
+            )
             raise InvalidValue(
-                "dimensions", dims, "must be a tuple of different names"
-            ).with_location(f"output {name}")
+                "dimensions", dims, "must be a tuple of unique names", remedy=remedy
+            ).with_location(f"output {name!r}")
         for dim in dims:
             if dim not in measure.inner_coordinates:
                 raise InvalidValue(
@@ -598,7 +601,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
     for name in measure.solved_fields:
         if name not in SceneFields.NAMES:
             raise InvalidValue(
-                "solved_fields", name, "must contain scene fields", choices=SceneFields.NAMES
+                "solved_fields", name, "must contain only scene fields", choices=SceneFields.NAMES
             )
 
 

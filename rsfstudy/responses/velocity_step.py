@@ -205,7 +205,7 @@ class VelocityStep(RecordingMeasure):
         if self.step_number < 1:
             raise InvalidValue("step_number", self.step_number, "must be at least 1")
         if not 1.0 <= self.record < math.inf:
-            raise InvalidValue("record", self.record, "must be at least 1 D_c, and finite")
+            raise InvalidValue("record", self.record, "must be finite and at least 1 D_c")
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.

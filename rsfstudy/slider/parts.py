@@ -26,6 +26,7 @@ from __future__ import annotations
 import importlib
 import math
 import pkgutil
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
@@ -461,10 +462,11 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
             raise InvalidValue(field_name, value, rule)
         return bool(value)
     if flagged or not isinstance(value, Real):
-        has_units = isinstance(value, str) and value.strip()[:1].isdigit()
-        remedy = (
-            "To use values with units, create the scene with rsfstudy.Rig(...).scene(...)."
-        ) * has_units
+        remedy = ""
+        if isinstance(value, str) and re.match(r"\s*[-+.\d][\d.e+-]*:", value):
+            remedy = f"To use several values of {field_name}, declare an axis of a study."
+        elif isinstance(value, str) and re.match(r"\s*\d[\d.e+-]*\s*[^\W\d]", value):
+            remedy = "To use values with units, create the scene with rsfstudy.Rig(...).scene(...)."
         raise InvalidValue(field_name, value, "must be a number", remedy=remedy)
     try:
         plain = float(value)

@@ -102,8 +102,10 @@ def check_name_clashes(
         check_fields_not_solved_by_measure(measure, axis.fields)
         for name in (axis.dimension, *axis.fields):
             if name in taken:
-                remedy = "Rename the result or the field of the axis."
-                raise InvalidValue("axis", name, "has the name of a result", remedy=remedy)
+                remedy = "Rename the result, or the field that the axis varies."
+                raise InvalidValue(
+                    "axis", name, "has the same name as a result of the study", remedy=remedy
+                )
 
 
 def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:
@@ -199,8 +201,8 @@ def check_axis_fields_and_units(
         for name in axis.fields:
             if name not in known:
                 rule = (
-                    "is neither a field of a scene nor a number, flag or string field of the "
-                    f"{measure.name} measure"
+                    f"is not a scene field or a field of the {measure.name} measure that is a "
+                    "number, a flag or a string"
                 )
                 raise build_unknown_name_error("field", name, rule, known)
 

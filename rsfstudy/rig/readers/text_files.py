@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.formatting import format_count_with_noun
 from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
 from rsfstudy.rig.readers.text_layout import (
     COMMENT_LINE_PREFIXES,
@@ -256,9 +257,9 @@ def _check_row_lengths(rows: _TextFileRows, layout: TextLayout, file_name: str) 
         while len(row) > size and not row[-1].strip():
             row.pop()
         if len(row) != size:
-            rule = f"must have as many fields as the header ({size}), but has {len(row)}"
+            rule = f"has {format_count_with_noun(len(row), 'field')}, but the header has {size:,}"
             remedy = (
-                "Use decimal points, or pass decimal=',' (--decimal ',')."
+                "If the comma is a decimal separator, pass --decimal ',' (in Python, decimal=',')."
                 if len(row) > size
                 else ""
             )
