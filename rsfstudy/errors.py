@@ -22,7 +22,7 @@ _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60,
 #: Kinds of objects that an error message identifies by name, as in "column 'speed' is unknown".
 _KINDS_OF_NAMED_OBJECTS = frozenset(
     {"axis", "column", "dimension", "directory", "field", "header", "heading", "key", "line"}
-    | {"measure"}
+    | {"axis name", "point", "variable name"}
     | {"override", "problem", "reduction", "segment", "sheet", "study", "table", "variable"}
 )
 #: Maximum number of characters of a message.
@@ -239,9 +239,9 @@ def _format_violation(name: str, value: object, shown_value: str, rule: str) -> 
     if (rule.startswith(("must ", "accepts ")) or not is_short) and "(got " not in rule:
         requirement, conjunction, reason = rule.partition(", because")
         return f"{subject} {requirement} (got {shown_value}){conjunction}{reason}."
-    if name == "field" and rule.startswith(("is not a field", "is not a scene field")):
+    if name == "field" and rule.startswith("is not a scene field"):
         return f"{shown_value} {rule}."
-    relation = " " if is_kind and isinstance(value, str) else " = "
+    relation = " " if is_kind and isinstance(value, str | int) else " = "
     return f"{name}{relation}{shown_value} {rule}."
 
 

@@ -218,7 +218,7 @@ def test_opening_a_file_runs_no_code(small, tmp_path, monkeypatch):
     )
     rsfstudy.open(tmp_path / "trap.nc")
     rsfstudy.check(tmp_path / "trap.nc")
-    with pytest.raises(InvalidValue, match="measure 'evil' is not part of rsfstudy"):
+    with pytest.raises(InvalidValue, match="measure = 'evil' is not part of rsfstudy"):
         rsfstudy.rerun(tmp_path / "trap.nc", workers=0, progress=False)
     with pytest.raises(InvalidValue, match="plot = 'evil' is unknown"):
         plots.draw_figure(rsfstudy.open(tmp_path / "trap.nc"))

@@ -447,8 +447,8 @@ def _find_initial_stiffness(
     for record in records:
         if "normal_stress" not in record.columns:
             remedy = (
-                "Pass the normal stress with --normal-stress (in Python, the argument "
-                "normal_stress of read_record), or give the stiffness in 1/um."
+                "Pass the normal stress with --normal-stress (in Python, normal_stress= of "
+                "read_record), or pass the stiffness in 1/um."
             )
             rule = f"requires a normal stress, but the record {record.name!r} has none"
             raise InvalidValue("stiffness", stated_stiffness, rule, remedy=remedy)

@@ -142,8 +142,7 @@ def _compute_stds_and_correlation_matrix(
         rule = f"must be a {count} by {count} matrix of finite numbers"
         remedy = f"The order of the rows and columns is {', '.join(distributions)}."
         if count == 1:
-            rule = "must be a 1 by 1 matrix that contains a finite number"
-            remedy = f"The number is the variance of {next(iter(distributions))}."
+            remedy = f"The matrix contains the variance of {', '.join(distributions)}."
         raise InvalidValue("covariance", covariance, rule, remedy=remedy)
     variances = np.diag(given)
     if not np.allclose(given, given.T, rtol=1e-9, atol=0.0) or (variances <= 0.0).any():

@@ -355,7 +355,7 @@ class Measure(ConstructorKeywordCheckMixin):
                         "Override compute() instead, because the base class checks the result "
                         "of compute()."
                     )
-                    raise InvalidValue("measure", self.name, rule, remedy=remedy)
+                    raise InvalidValue(f"measure {self.name!r}", ..., rule, remedy=remedy)
             _check_names_declared_by_measure(self)
             for name, values in self.inner_coordinates.items():
                 _declaration_checks.check_coordinate_values(name, values)
@@ -575,12 +575,10 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
         elif names.count(name) > 1:
             rule = "is declared more than once"
         if rule:
-            raise InvalidValue(kind, name, rule).with_location(f"measure {measure.name!r}")
+            raise InvalidValue(kind, name, rule).with_location(f"measure {measure.name}")
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
-            remedy = (
-                f"For one dimension, write ({dims!r},)." if type(dims).__name__ == "str" else ""
-            )
+            remedy = "For a single dimension x, write ('x',)."
             raise InvalidValue(
                 "dimensions", dims, "must be a tuple of unique names", remedy=remedy
             ).with_location(f"output {name!r}")

@@ -250,8 +250,6 @@ def build_missing_columns_error(table: LazyTable, rule: str, alternative: str = 
         Table with all columns.
     rule : str
         Sentence that names the missing columns.
-    alternative : str, optional
-        Sentence at the end of the message, with a leading space.
 
     Returns
     -------
@@ -263,9 +261,9 @@ def build_missing_columns_error(table: LazyTable, rule: str, alternative: str = 
     else:
         shown = "1 (s)", "2 (um)", "3"
     remedy = (
-        "Select the columns, for example --columns "
+        "If the columns have other headings, select them, for example --columns "
         f"'time={shown[0]},displacement={shown[1]},friction={shown[2]}' or, in Python, "
-        f"columns={{'time': '{shown[0]}', 'displacement': '{shown[1]}', 'friction': '{shown[2]}'}}.{alternative}"
+        f"columns={{'time': '{shown[0]}', 'displacement': '{shown[1]}', 'friction': '{shown[2]}'}}."
     )
     header = ", ".join(table.headings)[:200]
     if not table.has_headings:

@@ -176,11 +176,12 @@ def _check_required_columns(columns_of_source: ColumnsReadFromSource) -> None:
     rubbed = {"friction", "shear_stress"} & {*names}
     if not ("time" in names and moved):
         rule = "has no recognised headings for time and displacement (or slip)"
-        alternative = ""
         if rubbed and ("time" in names or moved):
-            rule += ", which every record must contain"
-            alternative = " If the time or the displacement was not recorded, use rsfstudy.events."
-        raise build_missing_columns_error(table, rule, alternative)
+            rule += (
+                ", which every record must contain. If the time or the displacement was not "
+                "recorded, use rsfstudy.events"
+            )
+        raise build_missing_columns_error(table, rule)
     if not rubbed:
         raise build_missing_columns_error(
             table, "has no recognised heading for friction or shear stress"

@@ -26,7 +26,6 @@ from __future__ import annotations
 import importlib
 import math
 import pkgutil
-import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
@@ -462,11 +461,7 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
             raise InvalidValue(field_name, value, rule)
         return bool(value)
     if flagged or not isinstance(value, Real):
-        remedy = ""
-        if isinstance(value, str) and re.match(r"\s*[-+.\d][\d.e+-]*:", value):
-            remedy = f"To use several values of {field_name}, declare an axis of a study."
-        elif isinstance(value, str) and re.match(r"\s*\d[\d.e+-]*\s*[^\W\d]", value):
-            remedy = "To use values with units, create the scene with rsfstudy.Rig(...).scene(...)."
+        remedy = _suggest_number_format(value) if isinstance(value, str) else ""
         raise InvalidValue(field_name, value, "must be a number", remedy=remedy)
     try:
         plain = float(value)
@@ -508,3 +503,19 @@ def discover_parts(package_name: str, package_path: Iterable[str]) -> dict[str, 
 
 if not TYPE_CHECKING:
     __getattr__ = build_getattr_for_former_names(__name__)
+
+
+def _suggest_number_format(text: str) -> str:
+    """Return a remedy for a string that begins with a digit, but is not a number."""
+    if not text.strip()[:1].isdigit():
+        return ""
+    if ":" in text:
+        return "To use several values of a field, declare an axis of a study."
+    if "," in text:
+        return "Use a decimal point, for example 1.4."
+    if " " in text.strip() or any(c.isalpha() for c in text):
+        return (
+            "To use values with units, define a rig, and create the scene with Rig.scene, or pass "
+            "the rig to the study."
+        )
+    return "Pass a number instead of a string, for example 1.4."

@@ -343,7 +343,7 @@ def _build_unknown_field_error(name: str, value: Any, field_index: FieldIndex) -
             rule = f"does not apply to {slot.name}={part.name!r}"
             remedy = f"Omit {name}, or set {slot.name}={owner.name!r}."
             return InvalidValue(name, value, rule, remedy=remedy)
-    remedy, rule = hint_for_unknown_field(name), "is not a field of a scene"
+    remedy, rule = hint_for_unknown_field(name), "is not a scene field"
     # If the name is a known synonym of a field, a list of similar names would be misleading.
     return InvalidValue(
         "field", name, rule, choices=() if remedy else field_index.all_field_names, remedy=remedy

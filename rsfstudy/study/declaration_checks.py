@@ -102,10 +102,8 @@ def check_name_clashes(
         check_fields_not_solved_by_measure(measure, axis.fields)
         for name in (axis.dimension, *axis.fields):
             if name in taken:
-                remedy = "Rename the result, or the field that the axis varies."
-                raise InvalidValue(
-                    "axis", name, "has the same name as a result of the study", remedy=remedy
-                )
+                remedy = "Rename the result or the field of the axis."
+                raise InvalidValue("axis", name, "has the same name as a result", remedy=remedy)
 
 
 def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:
@@ -201,8 +199,8 @@ def check_axis_fields_and_units(
         for name in axis.fields:
             if name not in known:
                 rule = (
-                    f"is not a scene field or a field of the {measure.name} measure that is a "
-                    "number, a flag or a string"
+                    "is unknown. The name must be a scene field, or a field of the "
+                    f"{measure.name} measure that is a number, a flag or a string"
                 )
                 raise build_unknown_name_error("field", name, rule, known)
 

@@ -257,7 +257,7 @@ def _check_row_lengths(rows: _TextFileRows, layout: TextLayout, file_name: str) 
         while len(row) > size and not row[-1].strip():
             row.pop()
         if len(row) != size:
-            rule = f"has {format_count_with_noun(len(row), 'field')}, but the header has {size:,}"
+            rule = f"has {format_count_with_noun(len(row), 'field')}, but the header has {size}"
             remedy = (
                 "If the comma is a decimal separator, pass --decimal ',' (in Python, decimal=',')."
                 if len(row) > size

@@ -73,8 +73,8 @@ def declare_cutoff_velocity_field() -> Any:
         "1",
         "cut-off velocity of the evolution effect",
         rule=POSITIVE,
-        remedy="For state evolution without a cut-off velocity, choose a law other than 'cut_off' "
-        "or 'composite'.",
+        remedy="For state evolution without a cut-off velocity, choose a law other than "
+        "'cut_off' or 'composite'.",
     )
 
 
@@ -304,8 +304,8 @@ class LawBase(Part):
                 else f"{slot_name if pressed else 'dynamics'}={one_way.name!r}"
             )
             rule = (
-                f"cannot be combined with {other}, because the equations for {other} contain ln V "
-                "and are therefore valid for forward slip only"
+                f"cannot be combined with {other}, because the corresponding equations contain "
+                "ln V and are therefore valid for forward slip only"
             )
             raise self.build_field_error("regularised", rule, "Omit one of the two.")
 

@@ -156,12 +156,10 @@ class Loading(Part):
             self._check_segment_durations()
         fluid, name = scene.parts.fluid, self.selecting_field_name
         if self.unknowns and fluid.unknowns and not self.of_pressure:
-            rule = (
-                f"cannot be combined with fluid={fluid.name!r}, because both change the effective "
-                "normal stress"
-            )
+            rule = f"cannot be combined with fluid={fluid.name!r}"
+            rule += ", because both change the effective normal stress"
             value = getattr(self, name or "name")
-            remedy = "Omit one of the two."
+            remedy = f"Omit {name or 'loading'} or fluid."
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
 
     def _check_segment_durations(self) -> None:

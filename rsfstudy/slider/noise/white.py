@@ -119,10 +119,8 @@ class WhiteNoise(Noise):
             remedy = "Noise can only be added to steady loading, steps and protocols."
             raise InvalidValue("loading_noise", self.name, rule, remedy=remedy)
         if self.unknowns and fluid.unknowns:
-            rule = (
-                f"cannot be combined with fluid={fluid.name!r}, because both change the effective "
-                "normal stress"
-            )
+            rule = f"cannot be combined with fluid={fluid.name!r}"
+            rule += ", because both change the effective normal stress"
             raise self.build_field_error("normal_stress_noise", rule, "Omit one of the two.")
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
