@@ -236,7 +236,7 @@ def _format_violation(name: str, value: object, shown_value: str, rule: str) -> 
     if value is ... or (value is None and rule.startswith(("is required", "is missing"))):
         return f"{subject} {rule}."
     is_short = value is None or isinstance(value, str | Number) or callable(value)
-    if (rule.startswith("must ") or not is_short) and "(got " not in rule:
+    if (rule.startswith(("must ", "accepts ")) or not is_short) and "(got " not in rule:
         requirement, conjunction, reason = rule.partition(", because")
         return f"{subject} {requirement} (got {shown_value}){conjunction}{reason}."
     if name == "field" and rule.startswith("is not a scene field"):

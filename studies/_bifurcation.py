@@ -162,7 +162,7 @@ class Bifurcation(Measure):
         if self.transient < 0:
             raise InvalidValue("transient", self.transient, "must be 0 or greater")
         if self.events < 4:
-            raise InvalidValue("events", self.events, "must be at least 4")
+            raise InvalidValue("number of events", self.events, "must be at least 4")
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:

@@ -400,7 +400,7 @@ def test_files_and_problems_that_are_not_there_are_said_so():
     ran = call_main("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
     assert (ran.returncode, "the file nowhere.csv does not exist" in ran.stderr) == (1, True)
     ran = call_main("verify", "nowhere.csv")
-    assert (ran.returncode, "problem 'no' is not a problem number" in ran.stderr) == (
+    assert (ran.returncode, "problem 'no' is unknown" in ran.stderr) == (
         2,
         True,
     )

@@ -352,7 +352,9 @@ def _convert_samples_to_finite_array(variable_name: str, values: Any) -> np.ndar
     if not np.isfinite(samples).all():
         late = int(np.argmin(np.isfinite(samples)))
         raise InvalidValue(
-            variable_name, samples[late], f"must be finite, but is not finite at sample {late}"
+            variable_name,
+            samples[late],
+            f"must be finite at all samples, but sample {late} is not finite",
         )
     return samples
 

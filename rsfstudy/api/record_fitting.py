@@ -38,6 +38,7 @@ from rsfstudy.fitting import (
     parameters_of_law,
     split_window_number,
 )
+from rsfstudy.formatting import format_count_with_noun
 from rsfstudy.measures import Fit
 from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.reductions import Range
@@ -374,7 +375,10 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
         if not 1 <= number <= count:
-            rule = f"must contain step numbers from 1 to {count}"
+            found = format_count_with_noun(count, "step")
+            rule = f"must contain numbers of steps in the record, which has {found}"
+            if len(records) > 1:
+                rule = f"must contain numbers of steps in the records, which have up to {found}"
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:
@@ -446,7 +450,7 @@ def _find_initial_stiffness(
                 "Pass the normal stress with --normal-stress (in Python, normal_stress= of "
                 "read_record), or pass the stiffness in 1/um."
             )
-            rule = f"requires a normal stress, but {record.name} has no normal stress"
+            rule = f"requires a normal stress, but the record {record.name!r} has none"
             raise InvalidValue("stiffness", stated_stiffness, rule, remedy=remedy)
     return 0.0, found, 0.0
 
@@ -570,7 +574,7 @@ def _format_filter_as_string(averaging: Any, low_pass: str) -> str:
     is empty if the user passes neither ``averaging`` nor ``low_pass``.
     """
     if averaging is not None and low_pass:
-        remedy = "Pass either averaging= or low_pass=, not both."
+        remedy = "Omit one of the two."
         raise InvalidValue("low_pass", low_pass, "cannot be combined with averaging", remedy=remedy)
     if averaging is not None:
         kind, size = MEAN, averaging

@@ -199,12 +199,13 @@ def simulate(
     """
     if extra_positional_arguments:
         remedy = (
-            f"Write duration={shorten_text(extra_positional_arguments[0])}, in units of D_c/V_*."
+            f"Write duration={shorten_text(extra_positional_arguments[0])}. The unit of duration "
+            "is D_c/V_*."
         )
         raise InvalidValue(
-            "optional arguments of simulate",
+            "simulate()",
             extra_positional_arguments[0],
-            "must be passed by name",
+            "accepts optional arguments by name only",
             remedy=remedy,
         )
     check_is_scene(scene)

@@ -494,7 +494,7 @@ def _build_rows_from_columns(
             remedy = "Rename the column or the axis."
             raise InvalidValue("column", name, rule, remedy=remedy)
         if length != max(lengths.values()):
-            raise InvalidValue("columns", lengths, "must have the same length")
+            raise InvalidValue("the lengths of the columns", lengths, "must be equal")
     made = [
         [to_plain_value(name, value) for value in column]
         for name, column in values_by_field.items()

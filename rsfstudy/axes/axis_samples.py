@@ -130,8 +130,8 @@ def _compute_stds_and_correlation_matrix(
     ]
     if covariance is None:
         if estimates:
-            rule = "is a mean value without a variance"
-            remedy = "Pass covariance=, or replace the value by a distribution."
+            rule = "is a mean value, which requires a variance"
+            remedy = "Pass the argument covariance, or replace the value with a distribution."
             raise InvalidValue(estimates[0], distributions[estimates[0]], rule, remedy=remedy)
         return np.ones(count), np.eye(count)
     try:
@@ -276,7 +276,9 @@ def compute_field_values_from_samples(
     for name, by in quantity_or_function_by_field.items():
         if isinstance(by, str):
             if by not in sampled_values:
-                raise InvalidValue(name, by, "is not a sampled quantity", choices=sampled_values)
+                raise InvalidValue(
+                    name, by, "is not the name of a sampled quantity", choices=sampled_values
+                )
             found[name] = sampled_values[by]
         else:
             found[name] = _evaluate_field_function(
@@ -323,7 +325,7 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         If the object is not a table, if a column occurs twice, or if units contradict each other.
     """
     if not hasattr(table, "keys") or getattr(table, "ndim", 2) != 2 or not len(table):
-        rule = "must have named columns"
+        rule = "must have named columns and at least one row"
         remedy = "Pass a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
         raise InvalidValue("table", table, rule, remedy=remedy)
     found: dict[str, Any] = {}
@@ -341,7 +343,9 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         if name in found:
             raise InvalidValue("column", name, "occurs twice in the table")
         if stated and of_heading and stated != of_heading:
-            raise InvalidValue("units", stated, f"differ from the units in the heading, {heading}")
+            rule = f"differ from the units in the heading {heading!r}"
+            remedy = "Omit the units, or correct the heading."
+            raise InvalidValue("units", stated, rule, remedy=remedy)
         values = getattr(column, "values", column)
         values = np.asarray(values) if hasattr(values, "dtype") else values
         if np.ndim(np.asarray(values, dtype=object)) != 1:

@@ -88,7 +88,8 @@ def _parse_assignments_rejecting_duplicates(
     for text in assignments:
         name, given = parse_assignment(text)
         if name in found:
-            raise InvalidValue("--set", text, f"sets {name} twice")
+            rule = f"must not set {name} more than once"
+            raise InvalidValue("--set", text, rule, remedy="Remove one of the values.")
         found[name] = given
     return found
 

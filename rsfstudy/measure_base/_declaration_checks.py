@@ -43,8 +43,8 @@ def check_declared_work_estimates(
     for tolerance in (Accuracy.MIN_RTOL, Accuracy.DEFAULT_RTOL, Accuracy.MAX_RTOL):
         expected = expected_work(Accuracy(tolerance))
         if not 0 < expected < np.inf:
-            rule = f"must be finite and greater than 0 for rtol={tolerance:g}"
-            raise InvalidValue("expected_work", expected, rule)
+            rule = "must be finite and greater than 0"
+            raise InvalidValue(f"expected_work at rtol={tolerance:g}", expected, rule)
 
 
 def check_measure_description(

@@ -156,7 +156,7 @@ class Elasticities(Measure):
             not isinstance(self.measure, Measure)
             or self.measure.variables[self.measure.primary_output]
         ):
-            rule = "must be a Measure whose primary output is a single number"
+            rule = "must be a Measure object whose primary output is a single number"
             raise InvalidValue("measure", self.measure, rule)
         object.__setattr__(
             self,

@@ -355,12 +355,12 @@ class Measure(ConstructorKeywordCheckMixin):
         try:
             for name in ("__call__", "run_nested", "run_metered"):
                 if getattr(type(self), name) is not getattr(Measure, name):
-                    rule = f"overrides {name}"
+                    rule = f"overrides {name}()"
                     remedy = (
-                        "Override compute instead, because the base class checks the result "
-                        "of compute."
+                        "Override compute() instead, because the base class checks the result "
+                        "of compute()."
                     )
-                    raise InvalidValue("measure", self.name, rule, remedy=remedy)
+                    raise InvalidValue(f"measure {self.name!r}", ..., rule, remedy=remedy)
             _check_names_declared_by_measure(self)
             for name, values in self.inner_coordinates.items():
                 _declaration_checks.check_coordinate_values(name, values)
@@ -590,8 +590,9 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             )
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
+            remedy = "For a single dimension x, write ('x',)."
             raise InvalidValue(
-                "dimensions", dims, "must be a tuple of different names"
+                "dimensions", dims, "must be a tuple of unique names", remedy=remedy
             ).with_location(f"output {name!r}")
         for dim in dims:
             if dim not in measure.inner_coordinates:
@@ -610,7 +611,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
     for name in measure.solved_fields:
         if name not in SceneFields.NAMES:
             raise InvalidValue(
-                "solved_fields", name, "must contain scene fields", choices=SceneFields.NAMES
+                "solved_fields", name, "must contain only scene fields", choices=SceneFields.NAMES
             )
 
 

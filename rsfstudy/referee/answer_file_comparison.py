@@ -67,7 +67,7 @@ def compare_file_with_known_answer(
         raise InvalidValue(
             "problem",
             number,
-            "is not a problem number",
+            "is unknown",
             choices=map(str, there),
             remedy=remedy,
         )

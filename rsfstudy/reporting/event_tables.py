@@ -15,9 +15,9 @@ _HEADING_BY_EVENT_VARIABLE = {
     "time": "time",
     "displacement": "displacement",
     "duration": "duration",
-    "interval": "interval",
+    "interval": "interval since previous event",
     "static_stress_drop": "static stress drop",
-    "static_stress_drop_error": "+-",
+    "static_stress_drop_error": "95 % uncertainty",
     "dynamic_stress_drop": "dynamic stress drop",
     "slip": "slip",
     "peak_slip_rate": "peak slip rate",
@@ -52,7 +52,7 @@ def build_record_events_tables_and_sentences(event_catalogue: xr.Dataset) -> lis
         row = {"event": str(place + 1)}
         for name, words in heads.items():
             units = format_units(event_catalogue[name])
-            heading = words if units == "1" or words == "+-" else f"{words} ({units})"
+            heading = words if units == "1" else f"{words} ({units})"
             row[heading] = format_number_or_dash(float(event[name]), ".4g")
         rows.append({**row, "cut": flags[int(event["cut"])].replace("_", " ")})
     units = format_units(event_catalogue["noise"])

@@ -63,7 +63,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     columns.append(TextTableColumn(name, name, format_number_or_dash, "value"))
     if f"{name}_error" in dataset:
         short = partial(format_number_or_dash, format_specification=".1e")
-        columns.append(TextTableColumn("error", f"{name}_error", short, "error"))
+        columns.append(TextTableColumn("numerical error", f"{name}_error", short, "error"))
     size, fewer = dataset["status"].size, 1 + len(drawn) // _MAX_FIELD_COLUMNS_WITHOUT_THINNING
     most = (
         size if size <= _MAX_ROWS_WITHOUT_THINNING // fewer else MAX_ROWS_IN_THINNED_TABLE // fewer

@@ -138,7 +138,7 @@ class Healing(RecordingMeasure):
         """Check the fields of the measure."""
         super().__post_init__()
         if not 0.0 < self.record < math.inf:
-            raise InvalidValue("record", self.record, "must be positive and finite")
+            raise InvalidValue("record", self.record, "must be a positive, finite number")
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.

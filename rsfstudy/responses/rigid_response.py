@@ -128,7 +128,7 @@ class RigidResponse(Measure):
     def __post_init__(self) -> None:
         """Check the fields of the measure."""
         if not 1.0 <= self.slip < math.inf:
-            raise InvalidValue("slip", self.slip, "must be at least 1 D_c")
+            raise InvalidValue("slip", self.slip, "must be finite and at least 1 D_c")
         if self.points < 2:
             raise InvalidValue("points", self.points, "must be at least 2")
 

@@ -180,10 +180,10 @@ def _read_column_with_units(
             return column
         whole = f"{spec.heading} ({_EXAMPLE_UNITS_BY_COLUMN.get(column_name, 'MPa')})"
         remedy = (
-            f"In the file, add the units in parentheses to the heading, for example {whole}. "
-            f"Alternatively, pass --columns '{column_name}={whole},...' "
+            f"Add the units in parentheses to the heading in the file, for example {whole}, or "
+            f"pass the units with --columns '{column_name}={whole},...' "
         )
-        remedy += f"(columns={{'{column_name}': '{whole}', ...}})."
+        remedy += f"(in Python, columns={{'{column_name}': '{whole}', ...}})."
         raise InvalidValue("heading", column_selection, "has no units", remedy=remedy)
     return table.read_column(column_name, spec)
 
@@ -241,7 +241,7 @@ def _has_compatible_units(column_name: str, units: str) -> bool:
         return False
 
 
-def build_missing_columns_error(table: LazyTable, rule: str) -> InvalidValue:
+def build_missing_columns_error(table: LazyTable, rule: str, alternative: str = "") -> InvalidValue:
     """Return the error for a table without the required columns.
 
     Parameters

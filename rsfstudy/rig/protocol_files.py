@@ -134,18 +134,21 @@ def history(
     sizes = {len(column.values) for column in found.values()}
     if len(sizes) > 1 or min(sizes) < 2:
         rule = (
-            "must have the same number of samples in all columns, at least 2 (got "
-            f"{' and '.join(map(str, sorted(sizes)))} samples in the columns {', '.join(found)})"
+            "must have the same number of samples, and at least 2 samples (got "
+            f"{' and '.join(map(str, sorted(sizes)))} {'sample' if sizes == {1} else 'samples'} "
+            f"in the columns {', '.join(found)})"
         )
-        raise InvalidValue("record", ..., rule)
+        raise InvalidValue("all columns of the record", ..., rule)
     values = {
         key: _convert_column_to_dimensionless(key, column, rig) for key, column in found.items()
     }
     time = values["time"]
     late = np.append(False, np.diff(time) < MIN_SEGMENT_DURATION)
-    found["time"].raise_for_invalid_values(
-        "time", late, "must be later than the time of the previous sample"
+    rule = (
+        "must be later than the time of the previous sample by at least "
+        f"{MIN_SEGMENT_DURATION:g} D_c/V_*"
     )
+    found["time"].raise_for_invalid_values("time", late, rule)
     velocity, back = _compute_load_point_velocity(values, found)
     fall = None
     if "normal_stress" in found or "pore_pressure" in found:

@@ -178,8 +178,8 @@ def _check_required_columns(columns_of_source: ColumnsReadFromSource) -> None:
         rule = "has no recognised headings for time and displacement (or slip)"
         if rubbed and ("time" in names or moved):
             rule += (
-                ", which every record must contain. If the record has no time or no "
-                "displacement, use rsfstudy.events"
+                ", which every record must contain. If the time or the displacement was not "
+                "recorded, use rsfstudy.events"
             )
         raise build_missing_columns_error(table, rule)
     if not rubbed:
@@ -199,8 +199,11 @@ def _add_derived_columns(
         stress = values_by_column.get("normal_stress")
         if stress is None:
             rule = f"has no column for normal stress (columns: {', '.join(values_by_column)})"
-            remedy = "Pass --normal-stress (in Python, normal_stress=), for example '20 MPa'."
-            raise InvalidValue("record", ..., rule, remedy=remedy)
+            remedy = (
+                "Pass the normal stress, for example --normal-stress '20 MPa' (in Python, "
+                "normal_stress='20 MPa')."
+            )
+            raise InvalidValue("the record", ..., rule, remedy=remedy)
         check_normal_stress_is_positive(stress)
         values_by_column["friction"] = values_by_column["shear_stress"] / stress
     if "displacement" not in values_by_column:
@@ -231,8 +234,9 @@ def check_normal_stress_is_positive(normal_stress: np.ndarray) -> None:
     if (normal_stress < 0.0).all():
         rule = "must be positive, but is negative in all rows"
         remedy = (
-            "Compression is positive in rsfstudy. To reverse the sign, write a scale of -1 after "
-            "the heading: --columns 'normal_stress=HEADING * -1' (columns=)."
+            "Compression is positive in rsfstudy. To reverse the sign, multiply the column by -1: "
+            "--columns 'normal_stress=HEADING * -1' (in Python, "
+            "columns={'normal_stress': 'HEADING * -1'})."
         )
     raise InvalidValue("normal_stress", float(normal_stress[row]), rule, remedy=remedy)
 

@@ -99,8 +99,9 @@ class RowSelection:
             last = min(last, self._find_row_index_of_limit("end", self.end, columns))
         if first >= last:
             stated = {"rows": self.rows, "begin": self.begin, "end": self.end}
-            rule = f"must contain at least one of the {count:,} rows of the record"
-            raise InvalidValue("selected range", stated, rule)
+            stated = {key: value for key, value in stated.items() if value is not None}
+            rule = f"must select at least one row of the record, which has {count:,} rows"
+            raise InvalidValue(" and ".join(map(repr, stated)), stated, rule)
         if (first, last) == (0, count):
             return dict(columns), []
         kept = slice(first, last)

@@ -145,8 +145,9 @@ def hint_for_unknown_part_name(slot_name: str, value: Any, valid_part_names: Ite
     """
     if slot_name == "normal_stress" and re.match(r"[\d.]", str(value)):
         return (
-            "To set the value of the normal stress, pass Rig(normal_stress=...). In a study with "
-            "a rig, normal_stress can also be an axis or an override."
+            "The field normal_stress selects a model of normal stress. To set the value of the "
+            "normal stress, pass Rig(normal_stress=...). In a study with a rig, an axis or an "
+            "override named normal_stress can also set the value."
         )
     if not isinstance(value, str):
         return ""
@@ -178,5 +179,5 @@ def hint_for_positional_argument(
         if found:
             return found
     if isinstance(value, Mapping):
-        return "Write Scene(**fields)."
-    return "Pass fields by name, for example Scene(law='slowness', stiffness_ratio=0.8)."
+        return "To pass a mapping, unpack it with **, for example Scene(**fields)."
+    return "Write, for example, Scene(law='slowness', stiffness_ratio=0.8)."

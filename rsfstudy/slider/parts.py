@@ -509,6 +509,8 @@ def _suggest_number_format(text: str) -> str:
     """Return a remedy for a string that begins with a digit, but is not a number."""
     if not text.strip()[:1].isdigit():
         return ""
+    if ":" in text:
+        return "To use several values of a field, declare an axis of a study."
     if "," in text:
         return "Use a decimal point, for example 1.4."
     if " " in text.strip() or any(c.isalpha() for c in text):

@@ -89,8 +89,8 @@ class SliderParameters(Part):
         """
         if self.initial_stress <= -self.mu_star:
             rule = (
-                f"must exceed -mu_star = {-self.mu_star:g}, because the shear stress must be "
-                "positive"
+                f"must be greater than -mu_star, which is {-self.mu_star:g}, because the shear "
+                "stress must be positive"
             )
             raise self.build_field_error("initial_stress", rule)
         if self.initial_state and scene.parts.law.state_count > 1:

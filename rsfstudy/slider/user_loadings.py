@@ -213,7 +213,7 @@ def _parse_segment(
         if "normal_stress" in declared_segment:
             previous_normal_stress = (
                 _read_positive_number(
-                    declared_segment, "normal_stress", "greater than 0, and finite"
+                    declared_segment, "normal_stress", "finite and greater than 0"
                 )
                 - 1.0
             )

@@ -133,7 +133,9 @@ class Claim:
         if self.relation not in CLAIM_RELATIONS:
             raise self._invalid("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
         if self.relation == "equals" and self.reason == DEFAULT_REASON_FOR_TOLERANCE:
-            rule = f"must explain how the tolerance, {self.tolerance}, was chosen"
+            rule = (
+                f"must explain how the tolerance of {self.tolerance} was chosen, but is the default"
+            )
             raise self._invalid("reason", self.reason, rule)
         if self.expected not in _ALLOWED_EXPECTED_VERDICTS:
             rule = "is not a possible verdict"

@@ -318,8 +318,8 @@ def check_is_figure(figure_or_name: Any) -> None:
         )
     name = get_figure_name_for_declaration(figure_or_name, "")
     if not is_valid_variable_name(name):
-        rule = "must have a name that is a Python identifier"
-        raise InvalidValue("plot", name, rule, remedy="Define the figure with def.")
+        rule = "must be a function or module whose name is a Python identifier"
+        raise InvalidValue("plot", name, rule, remedy="Define the function with def.")
     if name in BUILT_IN_FIGURE_NAMES or name in list_study_names():
         rule = "must not have the name of a built-in figure"
         raise InvalidValue("plot", name, rule, remedy="Rename the function or module.")

@@ -50,7 +50,7 @@ def load_study(name_or_file: str) -> Study:
             source_file=name_or_file,
         )
     if name_or_file not in list_study_names():
-        near = difflib.get_close_matches(name_or_file, list_study_names(), n=3, cutoff=0.5)
+        near = difflib.get_close_matches(name_or_file, list_study_names(), n=3, cutoff=0.6)
         remedy = (
             "Run `rsfstudy list` to see all names, or pass the path of a study file "
             "(path/to/study.py)."

@@ -108,9 +108,7 @@ def _find_figure_path_in_output_option(command_options: options.CommandOptions) 
         check_regular_file("--output", output)
         return output
     if not output.is_dir():
-        rule = "must have the suffix of a figure format"
-        remedy = "To write to a directory with this name, create the directory first."
-        raise InvalidValue(
-            "--output", str(output), rule, choices=Defaults.FIGURE_FORMATS, remedy=remedy
-        )
+        *suffixes, last_suffix = (f".{suffix}" for suffix in Defaults.FIGURE_FORMATS)
+        rule = f"must end in {', '.join(suffixes)} or {last_suffix}, or be an existing directory"
+        raise InvalidValue("--output", str(output), rule)
     return None

@@ -259,7 +259,7 @@ def _check_row_lengths(rows: _TextFileRows, layout: TextLayout, file_name: str) 
         if len(row) != size:
             rule = f"has {format_count_with_noun(len(row), 'field')}, but the header has {size}"
             remedy = (
-                "Use decimal points, or pass decimal=',' (--decimal ',')."
+                "If the comma is a decimal separator, pass --decimal ',' (in Python, decimal=',')."
                 if len(row) > size
                 else ""
             )

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
+from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import (
     NON_NEGATIVE,
     POSITIVE,
@@ -243,6 +244,15 @@ class LawBase(Part):
         named = {"stress_dependence": self.stress_dependence, "regularised": self.regularised}
         return tuple(name for name, acts in named.items() if acts)
 
+    @classmethod
+    def build_field_rejection_error(cls, field_name: str, value: object) -> InvalidValue:
+        """Return the error for a field that belongs to another law.
+
+        See ``Part.build_field_rejection_error``.
+        """
+        rule = f"does not apply to law={cls.name!r}"
+        return InvalidValue(field_name, value, rule, remedy=f"Omit {field_name}.")
+
     def check(self, scene: SceneView) -> None:
         r"""Check that the scene supports the stress effect and reversed slip.
 
@@ -281,17 +291,22 @@ class LawBase(Part):
             )
             raise self.build_field_error("stress_dependence", rule, remedy)
         pressed = source.unknowns and not loading.has_load_point_unknown
+        slot_name = "fluid" if source is fluid else "loading"
         if scene.parts.temperature.unknowns:
-            pressed, source = True, scene.parts.temperature
+            pressed, source, slot_name = True, scene.parts.temperature, "temperature"
         one_way = (
             source if pressed else None if scene.dynamics.allows_reversed_slip else scene.dynamics
         )
         if self.regularised and one_way:
-            parts, slots = scene.parts, ("loading", "fluid", "temperature")
-            slot = next((s for s in slots if getattr(parts, s) is one_way), "")
+            selector = one_way.selecting_field_name
+            other = (
+                f"{selector}={getattr(one_way, selector)!r}"
+                if selector
+                else f"{slot_name if pressed else 'dynamics'}={one_way.name!r}"
+            )
             rule = (
-                f"cannot be combined with {slot}{'=' * bool(slot)}{one_way.name!r}, because the "
-                "corresponding equations contain ln V and are therefore valid for forward slip only"
+                f"cannot be combined with {other}, because the corresponding equations contain "
+                "ln V and are therefore valid for forward slip only"
             )
             raise self.build_field_error("regularised", rule, "Omit one of the two.")
 
