@@ -356,7 +356,7 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
     [
         ({"rows": (0, 5)}, "'rows' must be the numbers of the first and the last row"),
         ({"rows": (5, 3)}, "'rows' must be"),
-        ({"rows": (500, 600)}, "must contain at least one of the 40 rows of the record"),
+        ({"rows": (500, 600)}, "must select at least one row of the record, which has 40 rows"),
         ({"begin": "2 MPa"}, "begin = '2 MPa' is neither a time nor a displacement"),
         ({"begin": "x"}, "begin = 'x' is neither a time nor a displacement"),
         ({"begin": "1 h"}, "begin = '1 h' is outside the record, which covers 0 to 9.75 s"),
