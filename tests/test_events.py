@@ -87,7 +87,7 @@ def test_slip_rate_decides_what_an_event_is(motion):
     assert quick.sizes["event"] == slow.sizes["event"] == 4
     assert (quick.duration < slow.duration).all()
     assert motion.rsf.events(1e12).sizes["event"] == 0
-    with pytest.raises(InvalidValue, match=r"slip_rate = -1.*positive"):
+    with pytest.raises(InvalidValue, match=r"slip_rate must be positive"):
         motion.rsf.events(-1.0)
 
 
@@ -207,7 +207,9 @@ def test_a_load_point_moves_on_through_drops(motion):
     record = xr.Dataset({n: ("sample", arrays[n], {"units": unit}) for n, unit in units.items()})
     stated = rsfstudy.events(record, stiffness=f"{1e3 * stiffness!r} MPa/mm")
     np.testing.assert_allclose(stated.slip, read.slip, rtol=1e-12)
-    with pytest.raises(InvalidValue, match="stiffness = '1 MPa/um': .* the record has no units"):
+    with pytest.raises(
+        InvalidValue, match="stiffness = '1 MPa/um' cannot .* the record has no units"
+    ):
         rsfstudy.events(time=time, displacement=slip, shear_stress=stress, stiffness="1 MPa/um")
 
 

@@ -192,7 +192,7 @@ def test_a_cell_that_is_slow_on_the_clock_alone_is_not_ended(sturdy):
 
 @pytest.mark.parametrize("fault", ["raises", "nan"])
 def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_path):
-    with pytest.raises(RunError, match=r"the first \d+ cells all failed. .*keep_going=True"):
+    with pytest.raises(RunError, match=r"all of the first \d+ cells failed. .*keep_going=True"):
         run(faulty_study(fault, cells=100), output=tmp_path)
     partial = rsfstudy.open(tmp_path / "faulty.partial.nc")
     tried = partial.status != int(Status.PENDING)
@@ -362,7 +362,10 @@ def test_workers_that_never_come(monkeypatch):
     with (
         LocalCluster(n_workers=0, **QUIET_CLUSTER_OPTIONS) as cluster,
         Client(cluster) as client,
-        pytest.warns(UserWarning, match=r"has no worker. The run waits 0\.4 s for a worker"),
+        pytest.warns(
+            UserWarning,
+            match=r"has no worker. The run will end if no worker connects within 0\.4 s",
+        ),
         pytest.raises(RunError, match=r"no worker for 0\.4 s. Start workers"),
     ):
         run(faulty_study(), client=client)

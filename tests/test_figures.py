@@ -346,7 +346,7 @@ def test_styles_are_checked_and_never_imported(style, message, tmp_path, monkeyp
     ],
 )
 def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
-    message = r"^style = \{.* cannot be used to draw a figure: .* Draw the figure without"
+    message = r"^'style' cannot be used to draw a figure: .* Draw the figure without"
     with pytest.raises(InvalidValue, match=message):
         plots.save_figure(lattice(RATES), tmp_path / "figure.png", style=settings)
     assert not list(tmp_path.iterdir())

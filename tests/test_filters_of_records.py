@@ -135,7 +135,7 @@ def test_no_filter_is_detected_in_unfiltered_friction() -> None:
         ({"averaging": "1 s", "low_pass": "first_order 1 Hz"}, "cannot be combined with averaging"),
         ({"low_pass": "bessel 1 Hz"}, "first_order, butterworth_2"),
         ({"low_pass": "first_order 1 s"}, "incompatible"),
-        ({"averaging": "-1 s"}, "must be positive"),
+        ({"averaging": "-1 s"}, "must be a positive averaging time"),
         ({"averaging": "1 um"}, "averaging"),
     ],
 )

@@ -167,7 +167,10 @@ def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
     ("free", "error"),
     [
         (("a", "b"), "contains no evolution effect of law='two_slip_states'"),
-        (("a", "law_exponent"), "is not a parameter with law='slip' or law='two_slip_states'"),
+        (
+            ("a", "law_exponent"),
+            "must only contain parameters of law='slip' or law='two_slip_states'",
+        ),
         (("slip_distance_2",), "contains no parameter of law='slip'"),
     ],
 )
@@ -391,7 +394,7 @@ def test_posterior_draws_are_cases_in_their_units(tmp_path: Path) -> None:
         with pytest.raises(InvalidValue, match=rf"has no units.* um\. .*{re.escape(remedy)}"):
             Axis.cases(table)
         Axis.cases(table, units={"slip_distance": "um"})
-    with pytest.raises(InvalidValue, match=r"n = 51: is larger than.* 50.*posterior=51"):
+    with pytest.raises(InvalidValue, match=r"n = 51 is larger than.* 50.*posterior=51"):
         fit.rsf.sample_parameters(51, posterior=True)
     with pytest.raises(InvalidValue, match=r"requires a fit with posterior draws.*posterior=5"):
         fit.drop_vars("posterior").rsf.sample_parameters(5, posterior=True)

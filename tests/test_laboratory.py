@@ -337,5 +337,5 @@ def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
 )
 def test_a_rig_starts_from_constant_normal_stress(fields, expected):
     assert RIG.scene(**fields).normal_stress == expected
-    with pytest.raises(InvalidValue, match="a = -1"):
+    with pytest.raises(InvalidValue, match="must be greater than 0 .got -1"):
         RIG.scene(a=-1.0, **fields)

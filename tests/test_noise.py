@@ -369,7 +369,7 @@ def measures_of_motions() -> list[Measure]:
 @pytest.mark.parametrize("measure", measures_of_motions(), ids=lambda measure: measure.name)
 def test_measures_of_smooth_loading_refuse_noise(measure):
     scene = NOISY.with_(load_velocity_ratio=2.0, **FIELDS_BY_MEASURE.get(measure.name, {}))
-    with pytest.raises(InvalidValue, match=r"loading_noise = 'white': changes stress at random"):
+    with pytest.raises(InvalidValue, match=r"loading_noise = 'white' changes stress at random"):
         measure(scene, Accuracy())
 
 

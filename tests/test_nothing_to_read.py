@@ -98,8 +98,9 @@ def test_no_number_of_a_step_that_is_ok_is_missing():
 NOTHING = Record({name: np.arange(3.0) for name in ("time", "displacement", "friction")})
 #: Arguments that measures require.
 ASKED: dict[type, list[Any]] = {Fit: [(NOTHING,)], Elasticities: [VelocityStep()]}
-#: Parameters of fits that have the same names as fields of scenes and rigs.
-SHARED = {"a", "mu_star", "slip_distance"}
+#: Parameters of fits that have the same names as fields of scenes and rigs, and an output whose
+#: description depends on the measure.
+SHARED = {"a", "critical_stiffness", "mu_star", "slip_distance"}
 
 
 def every_measure() -> list[Measure]:

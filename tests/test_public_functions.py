@@ -180,7 +180,7 @@ def test_a_call_that_does_not_fit_is_a_type_error_of_python():
     with pytest.raises(TypeError, match="missing a required argument: 'dataset'"):
         rsfstudy.check()
     with pytest.raises(
-        TypeError, match=r"simulate\(\) has no parameter 't_end'.* It takes scene, .*, duration"
+        TypeError, match=r"simulate\(\) has no parameter 't_end'.* Parameters: scene, .*, duration"
     ):
         rsfstudy.simulate(Scene(), t_end=50.0)
 

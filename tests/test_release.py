@@ -119,6 +119,7 @@ def test_references_of_the_paper_are_listed_and_cited():
     cited = set()
     for group in re.findall(r"\(([^()]*\d{4})\)", text):
         for citation in group.split(";"):
-            author, year = re.search(r"([A-Z][\w-]+)[^;]* (\d{4})$", citation.strip()).groups()
+            citation = " ".join(citation.split())
+            author, year = re.search(r"([A-Z][\w-]+)[^;]* (\d{4})$", citation).groups()
             cited.add((author, year))
     assert cited == set(listed)

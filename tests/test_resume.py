@@ -124,7 +124,7 @@ def test_a_worker_is_killed(held):
     run.let_through()
     code, out, said = wait_for_command(run.process)
     assert code == 0, out
-    assert "warning: a worker ended. Its " in said
+    assert "warning: a worker process ended unexpectedly. Its " in said
     assert len(said.splitlines()) == 1, said
     have_same_numbers(rsfstudy.open("faulty", run.output), uninterrupted())
 

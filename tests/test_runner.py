@@ -127,10 +127,10 @@ def test_code_that_workers_do_not_import_needs_no_guard():
 LOSES_TRACKER = """
 import pathlib, sys
 import psutil
-from rsfstudy.execution import clusters
+from rsfstudy.execution import dask_clusters
 
 if __name__ == "__main__":
-    with clusters.start_local_cluster(1, pathlib.Path(sys.argv[1])) as client:
+    with dask_clusters.start_local_cluster(1, pathlib.Path(sys.argv[1])) as client:
         for child in psutil.Process().children():
             if "resource_tracker" in " ".join(child.cmdline()):
                 child.kill()

@@ -49,7 +49,7 @@ class StatedEquations:
     def __init__(self, problem: dict[str, Any]) -> None:
         self.s = s = ProblemSlider(problem, mpmath.mp, lambda x: mpmath.mpf(str(x)))
         self.load, self.imposed = s.star, s.sigma
-        states = [abs(star) for star in s.steady_thetas_at_reference_velocity]
+        states = [abs(star) for star in s.theta_star]
         self.steps = ExtrapolatedSteps(
             20, mpmath.mpf("1e-19"), [s.sigma / 100, *states, *s.lengths[:1], 1, 1, s.star]
         )
@@ -68,7 +68,7 @@ class StatedEquations:
         s = self.s
         if not all(theta > 0 for theta in thetas):
             raise ArithmeticError("a trial step beyond the logarithm")
-        parts = zip(s.b, thetas, s.steady_thetas_at_reference_velocity, strict=True)
+        parts = zip(s.b, thetas, s.theta_star, strict=True)
         return sum(b * mpmath.log(theta / star) for b, theta, star in parts)
 
     def _friction(self, x: Any, psi: Any) -> Any:

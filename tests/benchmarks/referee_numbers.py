@@ -50,7 +50,7 @@ def growth_by_eigenvalues(problem: dict[str, Any]) -> Numbers:
     The equations in tau and theta are linearised by hand.
     """
     s = LogarithmicEquations(problem).s
-    theta, length, b = s.steady_thetas_at_reference_velocity[0], s.lengths[0], s.b[0]
+    theta, length, b = s.theta_star[0], s.lengths[0], s.b[0]
 
     def eigenvalues(k: float) -> np.ndarray:
         by_tau = 1.0 / (s.a * s.sigma / s.star + s.eta)
