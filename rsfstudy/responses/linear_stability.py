@@ -121,6 +121,7 @@ class LinearStability(Measure):
     """
 
     growth_rate: bool = False
+    fields_omitted_if_default: ClassVar[tuple[str, ...]] = ("growth_rate",)
     name: ClassVar[str] = "linear_stability"
     typical_work = 100
     needs_time: ClassVar[tuple[bool, ...]] = ()
