@@ -85,7 +85,7 @@ def test_the_error_is_what_cells_moved_by_theirs_change_in_all(reduction):
     expected = moved_one_by_one(reduction, dataset).transpose(*error.dims)
     np.testing.assert_allclose(error, expected, rtol=1e-5, atol=2e-15)
     assert error.attrs["comment"] == PROPAGATED_ERROR_COMMENT
-    assert error.attrs["long_name"].startswith("numerical error of")
+    assert error.attrs["long_name"].startswith("numerical error estimate of")
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])

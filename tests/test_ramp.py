@@ -76,7 +76,9 @@ def test_it_settles_once_over(slider):
 
 
 def test_what_is_not_asked_of_it():
-    with pytest.raises(InvalidValue, match="ramp' changes normal stress continuously"):
+    with pytest.raises(
+        InvalidValue, match="ramp' cannot be used here, because it changes the normal"
+    ):
         LimitCycle()(Scene(**IMPOSED, **RAMP), Accuracy())
 
 

@@ -176,7 +176,7 @@ def test_what_states_the_same_takes_the_place_of_an_axis():
     zipped = replace(plain, axes=[Axis("case", {"soft": {"stiffness_ratio": 0.5}})])
     with pytest.raises(InvalidValue, match="stiffness. is equivalent to stiffness_ratio"):
         zipped.with_(stiffness=0.02)
-    with pytest.raises(InvalidValue, match="varies 'load_velocity_ratio', which"):
+    with pytest.raises(InvalidValue, match="varies the field 'load_velocity_ratio', which"):
         study(RIG.axis("load_velocity", ["1 um/s"]), Axis("load_velocity_ratio", [2.0]))
 
 
@@ -292,7 +292,7 @@ def test_results_say_what_they_are_of(cycles):
     assert "slip_distance" not in of["rig"]
     scene = RIG.scene(**LAW, hold_time="10 s")
     motion = RIG.in_units(rsfstudy.simulate(scene, duration=1.0))
-    assert dataset_summaries.describe_dataset_origin(motion)["laboratory"] == (
+    assert dataset_summaries.describe_dataset_origin(motion)["rig"] == (
         "normal_stress = 5 MPa, slip_distance = 10 um, reference_velocity = 1 um/s, "
         "stiffness = 0.01 MPa/um"
     )

@@ -148,8 +148,8 @@ class Measure(ConstructorKeywordCheckMixin):
     #: stands for the equations in which time is an unknown, and False for the equations without
     #: time. The tuple is empty if the measure does not integrate motions.
     needs_time: ClassVar[tuple[bool, ...]] = (True,)
-    #: Fields that cell keys contain only if the value differs from the default. Declare a field here
-    #: if an existing measure gets a new field, so that runs can continue from older journals.
+    #: Fields that cell keys contain only if the value is not the default. Declare a field here if
+    #: an existing measure gets a new field, so that runs can continue from older journals.
     fields_omitted_if_default: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:

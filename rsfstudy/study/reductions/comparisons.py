@@ -390,7 +390,7 @@ class ClosedFormRatio(Reduction):
     long_names: ClassVar[Mapping[str, str]] = {
         "": "ratio of {of} to its closed-form value",
         "_closed_form": "closed-form value of {of}",
-        "_error": "numerical error of the ratio of {of} to its closed-form value",
+        "_error": "numerical error estimate of the ratio of {of} to its closed-form value",
     }
     unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"_closed_form": ("of",)}
 
