@@ -376,9 +376,8 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
     for number in numbers:
         if not 1 <= number <= count:
             found = format_count_with_noun(count, "step")
-            rule = f"must contain numbers of steps in the record, which has {found}"
-            if len(records) > 1:
-                rule = f"must contain numbers of steps in the records, which have up to {found}"
+            owner = "the record has" if len(records) == 1 else "the records have at most"
+            rule = f"must contain step numbers from 1 to {count}, because {owner} {found}"
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:

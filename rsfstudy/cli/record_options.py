@@ -87,11 +87,11 @@ record_reading_options = combine_option_decorators(
     ),
     make_number_with_units_option(
         "--begin",
-        "Time or load point displacement at which reading begins. Examples: '100 s' or '2 mm'.",
+        "First time or load point displacement to read. Examples: '100 s' or '2 mm'.",
     ),
     make_number_with_units_option(
         "--end",
-        "Time or load point displacement at which reading ends. Examples: '100 s' or '2 mm'.",
+        "Last time or load point displacement to read. Examples: '100 s' or '2 mm'.",
     ),
     click.option(
         "--thin",

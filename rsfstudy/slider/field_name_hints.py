@@ -18,7 +18,7 @@ _INERTIA_FIELD_NAME_HINT = (
     "create the scene from a rig."
 )
 _LOAD_VELOCITY_FIELD_NAME_HINT = (
-    "Write load_velocity_ratio, which is V_0/V_*. If you use a rig, write load_velocity with units."
+    "Use load_velocity_ratio, which is V_0/V_*. With a rig, use load_velocity with units."
 )
 _SIMULATION_DURATION_HINT = "Pass the duration to rsfstudy.simulate(scene, duration=...)."
 
@@ -39,7 +39,7 @@ def _map_names_to_same_value(space_separated_names: str, value: str) -> dict[str
 #: Error hints for field names that users may expect but scenes do not have.
 _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
     **_map_names_to_same_value("k K kappa spring_constant", f"Write {_STIFFNESS_FIELD_NAME_HINT}."),
-    **_map_names_to_same_value("b B", "Write b_over_a, which is b/a."),
+    **_map_names_to_same_value("b B", "Use b_over_a, which is b/a."),
     **_map_names_to_same_value("a_minus_b b_minus_a ab", "Write a and b_over_a, which is b/a."),
     **_map_names_to_same_value("A", "Write a."),
     **_map_names_to_same_value(

@@ -176,7 +176,7 @@ def _build_differences_table(
     from rsfstudy.formatting import format_number_or_text
     from rsfstudy.reporting import TextTable
 
-    headings = f"differing {section_name} entry", "A", "B"
+    headings = f"{section_name} entry that differs", "A", "B"
     rows = [
         (name, *(shorten_text(format_number_or_text(v), _MAX_VALUE_CHARACTERS) for v in pair))
         for name, pair in differences.items()
