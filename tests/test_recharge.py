@@ -125,5 +125,5 @@ def test_normal_stress_beside_a_fluid_is_refused():
     """
     for columns in ({}, {"pore_pressure": [0.0, 0.1]}):
         record = history({"time": [0.0, 1.0], "normal_stress": [1.0, 1.1], **columns})
-        with pytest.raises(InvalidValue, match="not apply to fluid='dilatant'"):
+        with pytest.raises(InvalidValue, match="cannot be combined with fluid='dilatant'"):
             Scene(**FAULT, **DILATANT, loading=record)

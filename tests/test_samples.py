@@ -90,7 +90,7 @@ def test_the_first_samples_are_a_sample_still():
     ]
     assert {row["a"] for row in whole.with_(a=0.012).axes[0].rows} == {0.012}
     assert not whole.with_(a=0.012).axes[0].sampling_info
-    with pytest.raises(InvalidValue, match="sample = 16.0 is not a point .* from 0 to 15"):
+    with pytest.raises(InvalidValue, match="point = 16.0 does not exist .* from 0 to 15"):
         whole.with_(sample=16)
     with pytest.raises(InvalidValue, match="'a' varies .*must be a single value for all points"):
         whole.with_(a=[0.01, 0.02])

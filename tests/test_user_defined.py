@@ -271,7 +271,7 @@ def steep_evolution(log_slip_rate, state, p):
 
 @dataclass(frozen=True, kw_only=True)
 class SteepLaw(Law):
-    name = "steep"
+    name = "overflowing"
     evolution = staticmethod(steep_evolution)
 
 
@@ -281,7 +281,7 @@ def test_an_overflow_at_the_start_of_a_step_names_the_law(engine):
                   load_velocity_ratio=1.0, initial_state=0.02)  # fmt: skip
     outcome = LimitCycle()(scene, Accuracy(engine=engine))
     assert outcome.status is Status.INTEGRATION_FAILED
-    assert "the function evolution of the part 'steep' overflows" in outcome.message
+    assert "the function evolution of the part 'overflowing' overflows" in outcome.message
     assert "log_slip_rate = " in outcome.message
     assert ", state = 0.0" in outcome.message
 
@@ -289,5 +289,5 @@ def test_an_overflow_at_the_start_of_a_step_names_the_law(engine):
 def test_an_overflow_during_a_motion_names_the_law():
     scene = Scene(law=SteepLaw, normal_stress="constant", b_over_a=1.5, stiffness_ratio=0.3,
                   inertia=True, load_velocity_ratio=10.0)  # fmt: skip
-    with pytest.warns(NoResultWarning, match="evolution of the part 'steep' overflows"):
+    with pytest.warns(NoResultWarning, match="evolution of the part 'overflowing' overflows"):
         rsfstudy.limit_cycle(scene, engine="python", rtol=1e-4)

@@ -248,7 +248,17 @@ class LawBase(Part):
     def build_field_rejection_error(cls, field_name: str, value: object) -> InvalidValue:
         """Return the error for a field that belongs to another law.
 
-        See ``Part.build_field_rejection_error``.
+        Parameters
+        ----------
+        field_name : str
+            Name of the field.
+        value : object
+            Value of the field.
+
+        Returns
+        -------
+        InvalidValue
+            Error whose message contains the name of this law.
         """
         rule = f"does not apply to law={cls.name!r}"
         return InvalidValue(field_name, value, rule, remedy=f"Omit {field_name}.")
