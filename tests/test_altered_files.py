@@ -147,7 +147,7 @@ def way_to(at: str) -> tuple[str | int, ...]:
         ("declaration.claims.0.id", removed, r"declaration.claims\[0\].id is missing"),
         ("declaration.claims.0.tolerance", replaced(10**400),
          "declaration.*(Number out of range|must be a number|int too large)"),
-        ("declaration.base.phi", replaced(95.0), "declaration.base.phi is invalid .*less than 90 degrees"),
+        ("declaration.base.phi", replaced(95.0), "base.phi is invalid .*less than 90"),
         ("declaration.novel", replaced(1), "declaration.novel is unknown"),
         ("provenance.versions.numpy", replaced(2),
          r"provenance.versions\[...\] is invalid .Expected `str`"),

@@ -94,8 +94,9 @@ class Part:
     #: because their steady values are extremely large at the slip rate of a rupture. The criteria
     #: for settled motions and for limit cycles ignore the excluded unknowns.
     excluded_from_distance: ClassVar[tuple[str, ...]] = ()
-    #: Names of the quantities in ``quantities_required_by_parts.QUANTITIES_A_PART_MAY_NEED`` that the rates of
-    #: the part need. A scene that cannot provide one of the quantities rejects the part.
+    #: Names of the quantities in ``quantities_required_by_parts.QUANTITIES_A_PART_MAY_NEED`` that
+    #: the rates of the part need. A scene that cannot provide one of the quantities rejects the
+    #: part.
     needs: ClassVar[Collection[str]] = frozenset()
     #: Names of the quantities that the functions of the part receive.
     received_quantity_names: ClassVar[frozenset[str]] = frozenset()
