@@ -107,7 +107,7 @@ def run_python(text):
 
 def test_a_newcomer_gets_a_table_files_and_code(shared_page, tmp_path):
     page = shared_page
-    page.get_by_text("contains no normal stress").wait_for()
+    page.get_by_text("has no column for normal stress").wait_for()
     page.get_by_label("Normal stress, if not in the file").fill("20 MPa")
     page.keyboard.press("Enter")
     page.locator("canvas").first.wait_for()
