@@ -112,7 +112,7 @@ def test_a_newcomer_gets_a_table_files_and_code(shared_page, tmp_path):
     page.keyboard.press("Enter")
     page.locator("canvas").first.wait_for()
     page.get_by_role("button", name="Fit", exact=True).click()
-    page.get_by_text("stiffness = None is required").wait_for()
+    page.get_by_text("is required. Pass").wait_for()
     page.get_by_label("Stiffness", exact=True).fill("0.04 MPa/um")
     page.keyboard.press("Enter")
     page.get_by_label("2: 140 s").uncheck()
