@@ -56,9 +56,8 @@ def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
         Key of 16 bytes.
     """
     of_scene, of_measure = scene.stored_fields(), measure.plain_fields
-    for name in measure.fields_omitted_if_default:
-        if of_measure[name] == type(measure).__dataclass_fields__[name].default:
-            del of_measure[name]
+    for name in measure.omitted_fields:
+        del of_measure[name]
     values = (*of_scene.values(), *of_measure.values())
     floats = [value for value in values if type(value) is float]
     others = tuple(None if type(value) is float else value for value in values)

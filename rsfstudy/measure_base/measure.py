@@ -148,8 +148,8 @@ class Measure(ConstructorKeywordCheckMixin):
     #: stands for the equations in which time is an unknown, and False for the equations without
     #: time. The tuple is empty if the measure does not integrate motions.
     needs_time: ClassVar[tuple[bool, ...]] = (True,)
-    #: Fields that cell keys contain only if the value is not the default. Declare a field here if
-    #: an existing measure gets a new field, so that runs can continue from older journals.
+    #: Fields that descriptions and cell keys contain only if the value is not the default. Declare
+    #: a field here if an existing measure gets a new field, so that files remain identical.
     fields_omitted_if_default: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
@@ -264,6 +264,15 @@ class Measure(ConstructorKeywordCheckMixin):
         """
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
         return {name: value for name, value in values.items() if isinstance(value, PlainValue)}
+
+    @property
+    def omitted_fields(self) -> frozenset[str]:
+        """Names of the fields that descriptions and cell keys omit."""
+        defaults = {
+            name: type(self).__dataclass_fields__[name].default
+            for name in self.fields_omitted_if_default
+        }
+        return frozenset(n for n, default in defaults.items() if getattr(self, n) == default)
 
     def with_(self, **changes: Any) -> Measure:
         """Return a copy of the measure with other values of plain fields.
@@ -535,11 +544,12 @@ class Measure(ConstructorKeywordCheckMixin):
         dict
             Name of the measure, and values of its fields.
         """
-        return {"name": self.name, **asdict(self)}
+        omitted = self.omitted_fields
+        return {"name": self.name, **{n: v for n, v in asdict(self).items() if n not in omitted}}
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Rebuild the fields that are not plain data from a measure description.
+        """Return the fields that a measure description omits or does not store as plain data.
 
         Parameters
         ----------
@@ -551,9 +561,10 @@ class Measure(ConstructorKeywordCheckMixin):
         Returns
         -------
         dict
-            Field values by name. The base class returns an empty dictionary.
+            Field values by name. The base class returns the default values of omitted fields.
         """
-        return {}
+        omitted = [name for name in cls.fields_omitted_if_default if name not in described]
+        return {name: cls.__dataclass_fields__[name].default for name in omitted}
 
 
 def _check_names_declared_by_measure(measure: Measure) -> None:

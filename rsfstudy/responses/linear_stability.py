@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from scipy.optimize import brentq
 
@@ -149,38 +149,6 @@ class LinearStability(Measure):
         The value is needed only to compute the growth rate.
         """
         return () if self.growth_rate else ("stiffness_ratio",)
-
-    def describe(self) -> dict[str, Any]:
-        """Return the definition of the measure as plain data.
-
-        The description contains ``growth_rate`` only if it is True. Declarations without growth
-        rates are therefore identical to the declarations that earlier versions wrote, before this
-        option existed.
-
-        Returns
-        -------
-        dict
-            Name of the measure, and values of its fields.
-        """
-        return {"name": self.name, **({"growth_rate": True} if self.growth_rate else {})}
-
-    @classmethod
-    def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Return the default of ``growth_rate`` if a description omits it.
-
-        Parameters
-        ----------
-        described : dict
-            Description of a measure, as returned by ``describe``.
-        path : str
-            Location of the description in the file, for use in error messages.
-
-        Returns
-        -------
-        dict
-            Field values by name.
-        """
-        return {} if "growth_rate" in described else {"growth_rate": False}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the critical stiffness, and the growth rate if requested.

@@ -74,9 +74,9 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
             isinstance(Axis.get_fields_of_point(point), Mapping) for point in values.values()
         ):
             return convert_axis_values_to_axis_units(Axis(dimension, values))
-        stated: Any = units or None
+        units_by_name: Any = units or None
         return convert_axis_values_to_axis_units(
-            Axis.cases(values, units=stated, dimension=dimension)
+            Axis.cases(values, units=units_by_name, dimension=dimension)
         )
     assert isinstance(units, str)
     if isinstance(values, str) and ":" in values:
@@ -113,11 +113,11 @@ def _create_single_field_axis(
     axis_rows: Sequence[AxisPointFieldValues], units: Mapping[str, str]
 ) -> Axis:
     """Create an axis with units for a single field."""
-    found, stated = _convert_axis_rows_to_common_units(
+    found, units_by_name = _convert_axis_rows_to_common_units(
         axis_rows, units, first_value_sets_units=True
     )
     (name,) = found[0]
-    return Axis(name, [row[name] for row in found], stated)
+    return Axis(name, [row[name] for row in found], units_by_name)
 
 
 def _convert_axis_rows_to_common_units(
@@ -132,7 +132,7 @@ def _convert_axis_rows_to_common_units(
     priority, the units of the axis, the units of the first value of the column, or SI units.
     """
     found: list[dict[str, Any]] = [{} for _row in axis_rows]
-    stated: dict[str, str] = {}
+    units_by_name: dict[str, str] = {}
     quantities: dict[str, list[tuple[dict[str, Any], Any]]] = {}
     for row, new in zip(axis_rows, found, strict=True):
         for given, value in row.items():
@@ -142,14 +142,16 @@ def _convert_axis_rows_to_common_units(
             if si:
                 quantities.setdefault(name, []).append((new, value))
                 ours = _parse_units_of_value(value) if first_value_sets_units else ""
-                stated.setdefault(name, units.get(given) or ours or si)
+                units_by_name.setdefault(name, units.get(given) or ours or si)
             elif units.get(given):
                 compute_factor_to_si(given, units[given])  # This call always raises an error.
     for name, held in quantities.items():
-        numbers = convert_values_to_units(name, [value for _row, value in held], stated[name])
+        numbers = convert_values_to_units(
+            name, [value for _row, value in held], units_by_name[name]
+        )
         for (row, _value), number in zip(held, numbers, strict=True):
             row[name] = number
-    return found, stated
+    return found, units_by_name
 
 
 def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: str) -> list[float]:
