@@ -80,8 +80,8 @@ def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, 
     drainage_ratio = drainage * math.exp(-log_slip_rate)
     exact = closed_form(a, b, weakening, drainage_ratio)
     ours = stability.compute_critical_stiffness(scene, log_slip_rate)
-    # The error of 1,500 random scenes is at most 1e-12 up to a drainage ratio of 100. If drainage is
-    # faster, roots of polynomials lose digits in proportion to the ratio, down to 1.2e-8.
+    # The error of 1,500 random scenes is at most 1e-12 up to a drainage ratio of 100. If drainage
+    # is faster, roots of polynomials lose digits in proportion to the ratio, up to 1.2e-8.
     assert ours == pytest.approx(exact, rel=min(1e-11 + 1e-12 * drainage_ratio, 5e-8))
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import rsfstudy
 from rsfstudy import Accuracy, Scene
+from rsfstudy.execution.cell_plan import compute_cell_key
 from rsfstudy.measures import LinearStability, Status
 
 
@@ -49,3 +50,13 @@ def test_growth_rate_is_valid_without_a_critical_stiffness():
 def test_the_description_without_growth_rates_is_unchanged():
     assert LinearStability().describe() == {"name": "linear_stability"}
     assert LinearStability(growth_rate=True).describe()["growth_rate"] is True
+
+
+def test_the_new_field_is_in_descriptions_and_cell_keys_only_if_it_is_set():
+    """Declarations and cell keys without growth rates are the same as before the field existed."""
+    plain, with_growth = LinearStability(), LinearStability(growth_rate=True)
+    assert plain.describe() == {"name": "linear_stability"}
+    assert with_growth.describe() == {"name": "linear_stability", "growth_rate": True}
+    assert LinearStability.fields_from_description(plain.describe(), "") == {"growth_rate": False}
+    assert LinearStability.fields_from_description(with_growth.describe(), "") == {}
+    assert compute_cell_key(Scene(), plain) != compute_cell_key(Scene(), with_growth)
