@@ -9,6 +9,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +31,7 @@ from rsfstudy.cli import assignment_parsing
 from rsfstudy.cli.study_results import StudyResults, print_failed_cells
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RunError
-from rsfstudy.execution import dask_clusters, study_run, worker_pool
+from rsfstudy.execution import dask_clusters, study_run, worker_log, worker_pool
 from rsfstudy.execution.cell_plan import CellBatchIterator
 from rsfstudy.reductions import LinearFit, Range, apply_reductions
 from rsfstudy.reporting import cell_tables
@@ -369,3 +370,24 @@ def test_workers_that_never_come(monkeypatch):
         pytest.raises(RunError, match=r"no worker for 0\.4 s. Start workers"),
     ):
         run(faulty_study(), client=client)
+
+
+def test_an_event_loop_of_dask_that_ends(tmp_path):
+    """The run ends with an error, and closing the cluster raises no other error."""
+
+    def end() -> None:
+        raise SystemExit
+
+    def end_the_loop(done, _total, _seconds_left):
+        if done:
+            client.loop.add_callback(end)
+            while not client.loop.asyncio_loop.is_closed():
+                time.sleep(0.01)
+
+    log = tmp_path / "workers.log"
+    with (
+        worker_log.open_worker_log(log) as log,
+        dask_clusters.start_local_cluster(1, log) as client,
+        pytest.raises(RunError, match="the connection to the Dask scheduler is lost"),
+    ):
+        run(faulty_study(), client=client, output=tmp_path, progress=end_the_loop)

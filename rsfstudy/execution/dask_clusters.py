@@ -127,6 +127,20 @@ def _tolerate_lost_resource_tracker() -> None:
         resource_tracker.unregister = _wrap_resource_tracker_unregister(resource_tracker.unregister)
 
 
+def _close_client(dask_client: Any) -> None:
+    """Close the client of a local cluster, also if its event loop has already ended.
+
+    Without an event loop, Dask cannot close the client, and the error would hide the results of the
+    run. Both the client and its cluster are then marked as closed.
+    """
+    from distributed.core import Status
+
+    if dask_client.loop.asyncio_loop.is_closed():
+        dask_client.status, dask_client.cluster.status = "closed", Status.closed
+    else:
+        dask_client.close()
+
+
 @contextlib.contextmanager
 def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
     """Start worker processes on this machine, with one thread each.
@@ -191,7 +205,9 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
                     "process: --serial (workers=0)"
                 ) from error
             stack.enter_context(cluster)
-        yield stack.enter_context(Client(cluster))
+        client = Client(cluster)
+        stack.callback(_close_client, client)
+        yield client
         said = log_path.stat().st_size
         stack.close()
         # The truncation removes heartbeat errors that were logged after the scheduler had closed.

@@ -276,7 +276,8 @@ def make_dask_batch_mapper(
                 else:
                     return
         finally:
-            dask_client.cancel(list(running))
+            with contextlib.suppress(RuntimeError):  # Without an event loop, no batch is running.
+                dask_client.cancel(list(running))
 
     return map_cells
 
@@ -326,7 +327,7 @@ def count_worker_threads(dask_client: Any) -> int:
         raise RunError(f"the Dask client is {dask_client.status}. Connect a client to a cluster")
     try:
         return sum(dask_client.nthreads().values())
-    except (OSError, TimeoutError) as error:
+    except (OSError, TimeoutError, RuntimeError) as error:  # The event loop may have ended.
         raise RunError(_SCHEDULER_LOST_MESSAGE) from error
 
 
@@ -366,7 +367,7 @@ def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any])
                     "the Dask cluster has had no worker for "
                     f"{GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s. Start workers"
                 ) from None
-        except CancelledError as error:
+        except (CancelledError, RuntimeError) as error:  # The event loop may have ended.
             raise RunError(_SCHEDULER_LOST_MESSAGE) from error
 
 
