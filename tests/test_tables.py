@@ -80,22 +80,22 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
             assert not [piece for piece in pieces(table) if not in_one_piece(piece, lines)]
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-def test_declarations_of_every_study(width, printed, tmp_path):
+def test_declarations_of_every_study(printed, tmp_path):
     """The points of all axes are printed in one piece."""
     for name in named_study_index.list_study_names():
         study = study_loader.load_study(name)
         declared = study_declarations.StudyDeclaration(study, tmp_path)
-        lines = printed(width, study_declarations.print_study_declaration, declared)
-        for axis in study.axes:
-            shown = (
-                axis.point_names
-                if len(axis) <= 40
-                else [*axis.point_names[:10], *axis.point_names[-3:]]
-            )
-            words = {word for point in shown for word in f"{point},".split()}
-            last = str(shown[-1]).split()[-1]
-            assert not [w for w in words if not in_one_piece(w, lines) and w != f"{last},"]
+        for width in WIDTHS:
+            lines = printed(width, study_declarations.print_study_declaration, declared)
+            for axis in study.axes:
+                shown = (
+                    axis.point_names
+                    if len(axis) <= 40
+                    else [*axis.point_names[:10], *axis.point_names[-3:]]
+                )
+                words = {word for point in shown for word in f"{point},".split()}
+                last = str(shown[-1]).split()[-1]
+                assert not [w for w in words if not in_one_piece(w, lines) and w != f"{last},"]
 
 
 def test_where_no_cell_has_a_number_the_status_is_explained():
