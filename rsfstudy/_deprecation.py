@@ -10,7 +10,7 @@ The former names will be removed in version 1.0.0. The dictionary
 ``"package.module:Class"``
     Members of a class with the decorator ``add_former_member_names``. If users may override the
     members in a subclass, the method ``__init_subclass__`` of the class calls
-    ``add_new_names_for_former_overrides``.
+    ``copy_former_overrides_to_new_names``.
 ``"package.module:function()"``, ``"package.module:Class()"``
     Keyword arguments of a function or of a constructor. The outermost decorator of the function or
     class is ``accept_former_keyword_names``.
@@ -44,7 +44,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "DEFAULT_EVALUATION_BUDGET": "Accuracy.DEFAULT_BUDGET",
         "MAX_ERROR_OVER_RTOL": "Accuracy.MAX_RELIABLE_ERROR_OVER_RTOL",
         "RELATIVE_ROUNDING_ERROR": "Accuracy.RELATIVE_ROUNDING_ERROR",
-        "MIN_LOCAL_TOLERANCE": "Integrator.MIN_LOCAL_TOLERANCE",
+        "MIN_LOCAL_TOLERANCE": "Integrator.MIN_LOCAL_ERROR_TOLERANCE",
         "SCIPY": "Engine.SCIPY",
         "PYTHON": "Engine.PYTHON",
         "COMPILED": "Engine.COMPILED",
@@ -55,7 +55,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "import_compiled_engine": "Engine.import_compiled_engine",
         "find_user_stepper": "Engine.find_user_stepper",
         "register_user_steppers": "Engine.register_user_steppers",
-        "RECORDED_VARIABLES": "MotionRecorder.VARIABLE_NAMES",
+        "RECORDED_VARIABLES": "MotionRecorder.RECORDED_VARIABLE_NAMES",
         "MOTION_VARIABLES": "MotionRecorder.MOTION_VARIABLE_NAMES",
         "REGIME_COLUMN": "MotionRecorder.REGIME_COLUMN",
         "SAMPLE_COLUMN": "MotionRecorder.SAMPLE_NUMBER_COLUMN",
@@ -63,10 +63,10 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "recorded_row": "MotionRecorder.convert_point_to_row",
         "recorded_friction_coefficient": "MotionRecorder.get_friction_coefficient",
         "recorded_load_point_displacement": "MotionRecorder.compute_load_point_displacement",
-        "initial_point": "Integrator.initial_point",
-        "point_before_start": "Integrator.point_before_start",
-        "compute_restart_point": "Integrator.restart_point",
-        "point_with_slip_rate": "Integrator.point_with_slip_rate",
+        "initial_point": "Integrator.compute_initial_point",
+        "point_before_start": "Integrator.compute_point_before_start",
+        "compute_restart_point": "Integrator.compute_restart_point",
+        "point_with_slip_rate": "Integrator.compute_point_with_slip_rate",
     },
     "rsfstudy.slider": {
         "build_sampled_history": "SampledHistory.from_samples",
@@ -77,22 +77,22 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "OMITTED_DEFAULTS": "SceneFields.DEFAULTS_OMITTED_FROM_STORED_SCENES",
         "SLOTS": "SceneFields.PART_SLOTS",
         "field_names": "SceneFields.list_names_of_part",
-        "scene_field_types": "SceneFields.collect_types_with_user_parts",
+        "scene_field_types": "SceneFields.map_field_names_to_value_types",
         "normalise_field_value": "SceneFields.replace_part_or_alias_by_part_name",
         "replace_names_by_user_parts": "SceneFields.replace_names_by_user_parts",
         "SCENE_FIELD_NAMES": "SceneFields.NAMES",
         "SCENE_FIELD_QUANTITIES": "SceneFields.QUANTITIES",
-        "SCENE_FIELD_TYPES": "SceneFields.TYPES",
+        "SCENE_FIELD_TYPES": "SceneFields.VALUE_TYPE_BY_NAME",
         "SLOT_NAMES": "SceneFields.PART_SLOT_NAMES",
         "PART_SELECTING_FIELDS": "SceneFields.NAMES_SELECTING_A_PART",
         "ALTERNATIVE_STIFFNESS_FIELDS": "SceneFields.ALTERNATIVE_NAMES_FOR_STIFFNESS",
-        "scene_field_defaults": "SceneFields.collect_defaults",
-        "scene_field_quantities": "SceneFields.collect_quantities_with_user_parts",
+        "scene_field_defaults": "SceneFields.map_field_names_to_defaults",
+        "scene_field_quantities": "SceneFields.map_field_names_to_quantities",
         "quantities_with_values": "SceneFields.iterate_quantities_with_values",
-        "add_scene_fields_to_signature": "SceneFields.add_to_signature",
+        "add_scene_fields_to_signature": "SceneFields.decorator_adding_fields_to_signature",
         "find_inapplicable_fields": "SceneFields.find_inapplicable_fields",
-        "hint_for_unknown_field": "SceneFields.hint_for_unknown_field",
-        "register_user_parts": "SceneFields.register_user_parts",
+        "hint_for_unknown_field": "SceneFields.build_hint_for_unknown_field",
+        "register_user_parts": "SceneFields.user_parts_registrar",
         "equations_between_ruptures": "Scene.equations_between_ruptures",
         "equations_in_rupture": "Scene.equations_in_rupture",
         "equations_without_mass": "Scene.equations_without_mass",
@@ -100,13 +100,13 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "build_equations_against_displacement": "Scene.equations_against_displacement",
         "build_equations_against_inertial_time": "Scene.equations_against_inertial_time",
         "quasi_static_log_slip_rate": "Scene.quasi_static_log_slip_rate",
-        "build_friction_relation": "Scene.friction_relation",
-        "build_state_evolution_function": "Scene.state_evolution_function",
+        "build_friction_relation": "Scene.build_friction_relation",
+        "build_state_evolution_function": "Scene.build_state_evolution_function",
         "compute_steady_states": "Scene.compute_steady_states",
-        "effective_normal_stress_at": "Scene.effective_normal_stress_at",
+        "effective_normal_stress_at": "Scene.compute_effective_normal_stress",
         "steady_sliding": "Scene.steady_sliding",
         "steady_friction_minus_reference": "Scene.steady_friction_minus_reference",
-        "frictional_stress_after_jump": "Scene.frictional_stress_after_jump",
+        "frictional_stress_after_jump": "Scene.frictional_stress_from_strength",
         "frictional_stress_for_friction": "Scene.frictional_stress_from_friction",
         "min_steady_log_slip_rate": "Scene.min_steady_log_slip_rate",
         "critical_stiffness": "Scene.critical_stiffness_at",
@@ -120,7 +120,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "is_stiffness_over_normal_stress": "Rig.is_stiffness_in_friction_per_length",
         "DIMENSIONLESS_PREFIX": "DatasetUnits.DIMENSIONLESS_PREFIX",
         "DISPLAY_BASE_UNITS": "DatasetUnits.DISPLAY_UNITS",
-        "NAME_OF_SCALES_ATTRIBUTE": "DatasetUnits.SCALES_ATTRIBUTE_NAME",
+        "NAME_OF_SCALES_ATTRIBUTE": "DatasetUnits.UNIT_SCALES_ATTRIBUTE_NAME",
         "convert_to_dimensional_name": "DatasetUnits.convert_to_dimensional_variable_name",
         "RATIO_FIELD_BY_DIMENSIONAL_NAME": "RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME",
         "make_axis_with_units": "RigAxes.create_axis",
@@ -128,7 +128,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "convert_values_to_units": "RigAxes.convert_values_to_units",
         "convert_axis_to_stated_units": "RigAxes.convert_axis_values_to_axis_units",
         "replace_rig_quantity": "RigAxes.replace_rig_quantity",
-        "convert_scene_and_axes_to_rig": "RigAxes.convert_scene_and_axes_to_rig",
+        "convert_scene_and_axes_to_rig": "RigAxes.convert_scene_and_axes_to_rig_units",
     },
     "rsfstudy.limit_cycles": {
         "SLIP_MODES": "LimitCycle.SLIP_MODES",
@@ -147,9 +147,9 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "read_timings": "CellWallTimes.read_from_journal",
     },
     "rsfstudy.axes": {
-        "fields_of_axis_point": "Axis.get_fields_of_point",
-        "check_storable_text": "Axis.check_storable_text",
-        "to_plain_value": "Axis.to_plain_value",
+        "fields_of_axis_point": "Axis.point_fields_getter",
+        "check_storable_text": "Axis.storable_text_checker",
+        "to_plain_value": "Axis.plain_value_converter",
     },
     "rsfstudy.errors": {
         "NoAnswer": "NoResultWarning",
@@ -171,7 +171,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "Laboratory": "Rig",
     },
     "rsfstudy.rig.rig:Rig": {
-        "on_axis": "axis_fields",
+        "on_axis": "si_values_by_axis_name",
     },
     "rsfstudy.rig.protocol_files:history()": {
         "laboratory": "rig",
@@ -312,9 +312,9 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.slider.laws:LawBase": {
         "states": "state_count",
-        "orbits_close": "has_closed_orbits",
+        "orbits_close": "has_closed_orbits_at_critical_stiffness",
         "logarithmic": "has_logarithmic_state",
-        "size_over_a": "state_change_per_log_rate_over_a",
+        "size_over_a": "steady_state_change_per_log_rate_over_a",
         "feels_stress": "depends_on_stress",
     },
     "rsfstudy.slider.laws:Law": {
@@ -322,7 +322,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.slider.normal_stress:NormalStress": {
         "follows_friction": "depends_on_shear_stress",
-        "weakest": "min_frictional_stress",
+        "weakest": "compute_frictional_stress_lower_bound",
     },
     "rsfstudy.slider.dynamics:Dynamics": {
         "reverses": "allows_reversed_slip",
@@ -330,17 +330,17 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "damping": "radiated_stress_slope",
         "norm": "compute_slip_rate_norm",
         "slip_rate": "build_slip_rate_functions",
-        "rupture_rate": "build_rupture_rate_function",
+        "rupture_rate": "build_rate_function_for_ruptures",
     },
     "rsfstudy.slider.loading:Loading": {
         "begins": "initial_unknowns",
         "alone": "isolate_segment",
         "told": "reported_segment_start_count",
         "table": "segment_table",
-        "jumps": "jump_mask",
+        "jumps": "jump_at_segment_start_mask",
         "is_a_step": "perturbs_steady_sliding",
         "imposes": "changes_normal_stress",
-        "displaces": "has_load_point_unknown",
+        "displaces": "adds_load_point_displacement_unknown",
         "presses": "adds_normal_stress_unknowns",
     },
     "rsfstudy.slider.parameter_layout": {
@@ -354,7 +354,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "chains": "segment_sequences_without_jumps",
         "unforced": "steadily_loaded_scene",
         "made": "result_cache",
-        "layout": "field_index",
+        "layout": "field_lookup",
         "own_parts": "user_parts",
         "states": "state_count",
         "log_load_rate": "log_load_velocity",
@@ -362,7 +362,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "is_disturbed": "is_perturbed",
         "begins_elsewhere": "starts_unsteady",
         "numbers_of_friction": "friction_parameter_values",
-        "shown": "quantities_with_values",
+        "shown": "iterate_quantities_with_values",
         "numbers": "parameter_values",
     },
     "rsfstudy.slider.motion_point:MotionPoint": {
@@ -380,10 +380,10 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "contribution": "state_contribution_to_friction",
         "by_pressure": "strength_derivatives_by_pressure",
         "states_at": "states_from_strength",
-        "imposed": "load_point_stress",
-        "imposed_change": "load_point_stress_change",
+        "imposed": "load_point_oscillation_stress",
+        "imposed_change": "load_point_oscillation_stress_change",
         "states": "state_count",
-        "counted": "indices_of_states_in_distance",
+        "counted": "state_indices_in_steady_state_distance",
     },
     "rsfstudy.slider.equations:EquationsOfMotion": {
         "rate": "rate_function",
@@ -411,42 +411,42 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "settle": "charge_work_since_last_call",
         "by_regime": "evaluations_by_regime",
     },
-    "rsfstudy.motion.events": {
+    "rsfstudy.motion.integration_events": {
         "Kind": "EventKind",
         "settling": "approach_to_steady_state",
     },
-    "rsfstudy.motion.events:maximum()": {
+    "rsfstudy.motion.integration_events:maximum()": {
         "of": "quantity",
         "ends": "terminal",
         "waits": "may_report_later",
     },
-    "rsfstudy.motion.events:minimum()": {
+    "rsfstudy.motion.integration_events:minimum()": {
         "of": "quantity",
         "ends": "terminal",
         "waits": "may_report_later",
     },
-    "rsfstudy.motion.events:rise()": {
-        "of": "quantity",
-        "to": "level",
-        "ends": "terminal",
-        "waits": "may_report_later",
-    },
-    "rsfstudy.motion.events:fall()": {
+    "rsfstudy.motion.integration_events:rise()": {
         "of": "quantity",
         "to": "level",
         "ends": "terminal",
         "waits": "may_report_later",
     },
-    "rsfstudy.motion.events:approach_to_steady_state()": {
+    "rsfstudy.motion.integration_events:fall()": {
+        "of": "quantity",
+        "to": "level",
+        "ends": "terminal",
+        "waits": "may_report_later",
+    },
+    "rsfstudy.motion.integration_events:approach_to_steady_state()": {
         "part": "fraction",
         "ends": "terminal",
     },
-    "rsfstudy.motion.events:EventSpecification": {
+    "rsfstudy.motion.integration_events:EventSpecification": {
         "of": "quantity",
         "ends": "terminal",
         "waits": "may_report_later",
     },
-    "rsfstudy.motion.events:Event": {
+    "rsfstudy.motion.integration_events:Event": {
         "watch": "specification",
         "work": "evaluation_count",
         "evaluations": "evaluation_count",
@@ -531,10 +531,10 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.api.study_runs:plot()": {
         "own": "user_figure",
     },
-    "rsfstudy.plots._figures:draw_figure()": {
+    "rsfstudy.plots._figure_drawing:draw_figure()": {
         "own": "user_figure",
     },
-    "rsfstudy.plots._figures:save_figure()": {
+    "rsfstudy.plots._figure_drawing:save_figure()": {
         "own": "user_figure",
     },
     "rsfstudy.plots._image_files:render_figure()": {
@@ -668,7 +668,7 @@ def translate_former_member_name(owner_class: type, member_name: str) -> str:
     return new
 
 
-def add_new_names_for_former_overrides(subclass: type) -> None:
+def copy_former_overrides_to_new_names(subclass: type) -> None:
     """Add the new names of members that a subclass defines under former names.
 
     If the subclass also defines the new name, the former name is ignored. A dataclass field becomes

@@ -117,7 +117,7 @@ class InvalidValue(RsfStudyError, ValueError):
         if rule == "is unknown" and choices and not isinstance(value, str):
             rule, choices = f"must be {_format_alternatives(choices)}", []
         shown = _short_value_repr.repr(value)
-        text = _format_violation(shorten_text(name), value, shown, rule)
+        text = _format_rule_violation(shorten_text(name), value, shown, rule)
         compared = [
             c
             for c in choices[:_MAX_COMPARED_CHOICES]
@@ -228,7 +228,7 @@ class IncompleteWarning(RsfStudyWarning):
     """Warning issued if a motion ended early or if cells of a run failed."""
 
 
-def _format_violation(name: str, value: object, shown_value: str, rule: str) -> str:
+def _format_rule_violation(name: str, value: object, shown_value: str, rule: str) -> str:
     """Write a sentence that contains a name, its invalid value and the violated rule."""
     is_kind = name in _KINDS_OF_NAMED_OBJECTS
     # A name such as "where" could be read as an English word, so it is written in quotation marks.

@@ -25,8 +25,8 @@ _NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION = {
 }
 #: Former suffixes of the ends of confidence intervals, with their new suffixes, and the beginnings
 #: of the ``long_name`` that these variables had.
-_NEW_INTERVAL_SUFFIX_BY_FORMER_SUFFIX = {"_low": "_ci_low", "_high": "_ci_high"}
-_FORMER_DESCRIPTIONS_OF_INTERVAL_ENDS = tuple(
+_NEW_CI_SUFFIX_BY_FORMER_SUFFIX = {"_low": "_ci_low", "_high": "_ci_high"}
+_FORMER_DESCRIPTION_PREFIXES_OF_CI_ENDS = tuple(
     f"{end} end of the 95 % interval of the" for end in ("lower", "upper", "low", "high")
 )
 #: New names of the fields of claims and of reductions, and of the outputs of measures.
@@ -73,7 +73,7 @@ def rename_former_declaration_fields(declaration: Any) -> Any:
     measure = current.get("measure")
     name = measure.get("name") if isinstance(measure, Mapping) else None
     outputs = dict(_NEW_OUTPUT_NAMES_BY_MEASURE.get(name, {})) if isinstance(name, str) else {}
-    outputs |= _find_new_names_of_sobol_intervals(current.get("reductions"))
+    outputs |= _find_new_names_of_sobol_ci_variables(current.get("reductions"))
     for key, rename in (("claims", _rename_claim_fields), ("reductions", _rename_reduction_fields)):
         if isinstance(listed := current.get(key), list):
             current[key] = [
@@ -82,7 +82,7 @@ def rename_former_declaration_fields(declaration: Any) -> Any:
     return current
 
 
-def _find_new_names_of_sobol_intervals(reductions: Any) -> dict[str, str]:
+def _find_new_names_of_sobol_ci_variables(reductions: Any) -> dict[str, str]:
     """Return the new names of the confidence intervals of Sobol indices."""
     names = [
         reduction.get("name")
@@ -93,7 +93,7 @@ def _find_new_names_of_sobol_intervals(reductions: Any) -> dict[str, str]:
         f"{name}_{order}{former}": f"{name}_{order}{new}"
         for name in names
         for order in ("first_order", "total")
-        for former, new in _NEW_INTERVAL_SUFFIX_BY_FORMER_SUFFIX.items()
+        for former, new in _NEW_CI_SUFFIX_BY_FORMER_SUFFIX.items()
     }
 
 
@@ -168,11 +168,11 @@ def _find_current_variable_name(variable_name: str, description: str) -> str:
     for (former, beginning), new in _NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION.items():
         if variable_name == former and description.startswith(beginning):
             return new
-    for former, new in _NEW_INTERVAL_SUFFIX_BY_FORMER_SUFFIX.items():
+    for former, new in _NEW_CI_SUFFIX_BY_FORMER_SUFFIX.items():
         if (
             variable_name.endswith(former)
             and not variable_name.endswith(new)
-            and description.startswith(_FORMER_DESCRIPTIONS_OF_INTERVAL_ENDS)
+            and description.startswith(_FORMER_DESCRIPTION_PREFIXES_OF_CI_ENDS)
         ):
             return variable_name.removesuffix(former) + new
     return variable_name

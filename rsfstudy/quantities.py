@@ -12,8 +12,8 @@ from html.entities import html5
 from typing import Any
 
 from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue, escape_control_characters
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 
 __getattr__ = build_getattr_for_former_names(__name__)
 
@@ -21,7 +21,7 @@ __getattr__ = build_getattr_for_former_names(__name__)
 _HEADING_WITH_UNITS_PATTERN = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Quantity:
     """Named quantity with a symbol, units and a description.
@@ -59,7 +59,7 @@ class Quantity:
     flags: tuple[str, ...] = ()
 
     @property
-    def attributes(self) -> dict[str, Any]:
+    def variable_attributes(self) -> dict[str, Any]:
         """Attributes of a variable that contains the quantity.
 
         Empty attributes are omitted.
@@ -78,7 +78,7 @@ class Quantity:
 
 
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Output(Quantity):
     r"""Number or array that a measure computes.
@@ -356,7 +356,7 @@ def _build_quantity_row(quantity: Quantity, value: object) -> tuple[object, ...]
 class HtmlTableMixin:
     """Base class of objects that notebooks display as a table."""
 
-    def quantities_with_values(self) -> Iterable[tuple[Quantity, object]]:
+    def iterate_quantities_with_values(self) -> Iterable[tuple[Quantity, object]]:
         """Return the quantities to display, with their values.
 
         Subclasses must override the method.
@@ -375,7 +375,9 @@ class HtmlTableMixin:
 
     def _repr_html_(self) -> str:
         """Return the HTML table that notebooks display."""
-        return format_quantities_as_html_table(self.quantities_with_values(), type(self).__name__)
+        return format_quantities_as_html_table(
+            self.iterate_quantities_with_values(), type(self).__name__
+        )
 
 
 def format_symbol_as_html(latex_symbol: str) -> HtmlMarkup:

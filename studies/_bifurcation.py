@@ -28,7 +28,7 @@ from rsfstudy.limit_cycles.limit_cycle_search import (
     follow_motion_to_periodic_orbit,
 )
 from rsfstudy.limit_cycles.return_map import (
-    FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE,
+    DIFFERENCE_STEP_OVER_LOG_RATE_RANGE,
     PeriodicOrbit,
     ReturnMap,
     extract_section_coordinates,
@@ -307,14 +307,14 @@ def _mean_growth(by: ReturnMap, seen: Sequence[StickSlipCycle], kept: int) -> tu
     """
     seen = seen[-(kept + _ALIGNMENT_EVENTS) :]
     step = (
-        FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE
+        DIFFERENCE_STEP_OVER_LOG_RATE_RANGE
         * by.scene.a
         * max(cycle.log_slip_rate_range for cycle in seen)
     )
-    departure, grown = np.ones(len(extract_section_coordinates(seen[0].start_point))), []
+    departure, grown = np.ones(len(extract_section_coordinates(seen[0].motion_point_at_start))), []
     for cycle in seen:
         start, offset = (
-            extract_section_coordinates(cycle.start_point),
+            extract_section_coordinates(cycle.motion_point_at_start),
             step * departure / np.linalg.norm(departure),
         )
         ahead, behind = (
@@ -349,8 +349,8 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[StickSlipCycle]) -> Peri
     for near in _closest_returns(seen):
         # After a period doubling, successive events alternate between the two sides of the cycle.
         midpoint = 0.5 * (
-            extract_section_coordinates(near.start_point)
-            + extract_section_coordinates(near.end_point)
+            extract_section_coordinates(near.motion_point_at_start)
+            + extract_section_coordinates(near.motion_point_at_end)
         )
         orbit = by.find_periodic_orbit(
             midpoint, 1, near.log_slip_rate_range, max_distance=_MAX_GUESS_DISTANCE
@@ -370,7 +370,7 @@ def _closest_returns(seen: Sequence[StickSlipCycle]) -> list[StickSlipCycle]:
 
     def off(cycle: StickSlipCycle) -> float:
         """Return the relative change of the states over a cycle."""
-        apart = np.subtract(cycle.end_point.psis, cycle.start_point.psis)
+        apart = np.subtract(cycle.motion_point_at_end.psis, cycle.motion_point_at_start.psis)
         return float(np.abs(apart).max()) / cycle.log_slip_rate_range
 
     return sorted(seen[len(seen) // 2 :], key=off)[:_MAX_CYCLE_GUESSES]

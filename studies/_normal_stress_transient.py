@@ -400,7 +400,7 @@ class NormalStressTransient(RecordingMeasure):
             np.ptp(friction[late])
             < _FINAL_FRICTION_RTOL * abs(record.remaining_transient(self.fit_from))
         )
-        path = resample_motion_along_path(rows, self.phases, MotionRecorder.VARIABLE_NAMES)
+        path = resample_motion_along_path(rows, self.phases, MotionRecorder.RECORDED_VARIABLE_NAMES)
         return {
             "direct_change": _direct_change(scene, record),
             "settled": compute_settled_friction_flag(

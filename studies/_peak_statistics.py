@@ -7,7 +7,7 @@ from itertools import islice
 from typing import ClassVar
 
 from rsfstudy import Integrator, Scene
-from rsfstudy.limit_cycles.event_statistics import EventStatistics, _Event
+from rsfstudy.limit_cycles.event_statistics import EventStatistics, _SlipEvent
 from rsfstudy.motion import maximum, minimum
 
 
@@ -26,7 +26,7 @@ class PeakStatistics(EventStatistics):
 
     def _list_events_delimiting_cycles(
         self, scene: Scene, integrator: Integrator, cycle_count: int
-    ) -> list[_Event]:
+    ) -> list[_SlipEvent]:
         """Return the events that delimit the intervals.
 
         See ``EventStatistics``.
@@ -37,7 +37,7 @@ class PeakStatistics(EventStatistics):
         return list(islice(_iterate_peaks(scene, integrator), first, first + cycle_count + 1))
 
 
-def _iterate_peaks(scene: Scene, integrator: Integrator) -> Iterator[_Event]:
+def _iterate_peaks(scene: Scene, integrator: Integrator) -> Iterator[_SlipEvent]:
     """Yield the peaks of slip rate with their stress drops."""
     fastest, highest, lowest = (
         maximum("log_slip_rate"),
@@ -51,4 +51,4 @@ def _iterate_peaks(scene: Scene, integrator: Integrator) -> Iterator[_Event]:
         elif event.specification == highest:
             stress = event.point.spring_stress
         elif event.specification == lowest and not math.isnan(time):
-            yield _Event(time, stress - event.point.spring_stress)
+            yield _SlipEvent(time, stress - event.point.spring_stress)

@@ -53,7 +53,7 @@ def scene_from_coordinates(cell: xr.Dataset) -> Scene:
     """
     here = {str(name): cell[name].item() for name in cell.coords if cell[name].ndim == 0}
     parts = find_user_parts_in_axis_rows(here, [here])
-    kinds = SceneFields.collect_types_with_user_parts(parts.values())
+    kinds = SceneFields.map_field_names_to_value_types(parts.values())
     # Coordinates that do not apply to the cell are NaN or an empty string.
     values = {n: v for n, v in here.items() if n in kinds and v == v and v != ""}
     flags = [name for name in values if kinds[name] in (bool, bool | None)]

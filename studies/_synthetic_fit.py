@@ -28,8 +28,11 @@ from rsfstudy.fitting.confidence_intervals import LikelihoodProfile, compute_stu
 from rsfstudy.fitting.fit_problem import FitProblem
 from rsfstudy.fitting.fit_solution import FitSolution
 from rsfstudy.fitting.fit_validity_checks import find_reasons_for_invalid_stderrs
-from rsfstudy.fitting.joint_model import JointModel, add_window_numbers_to_parameter_names
-from rsfstudy.fitting.noise import check_noise_model_name
+from rsfstudy.fitting.joint_window_model import (
+    JointWindowModel,
+    add_window_numbers_to_parameter_names,
+)
+from rsfstudy.fitting.noise_models import check_noise_model_name
 from rsfstudy.fitting.window_model import ParameterValues, WindowModel, check_fields_positive
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
 from rsfstudy.motion import Integrator
@@ -372,7 +375,7 @@ class SyntheticFit(Measure):
 
     def _joint_model(
         self, scene: Scene, integrator: Integrator, friction: np.ndarray | None = None
-    ) -> JointModel:
+    ) -> JointWindowModel:
         """Return the joint model of all windows."""
         smooth = integrator.tightened_to(1e-9)
         parts = []
@@ -381,9 +384,9 @@ class SyntheticFit(Measure):
             rows = slice(number * self.rows, (number + 1) * self.rows)
             seen = np.zeros(self.rows) if friction is None else friction[rows]
             parts.append(WindowModel(scene, time, moved, seen, loading, smooth))
-        return JointModel(tuple(parts))
+        return JointWindowModel(tuple(parts))
 
-    def _expected_stderrs(self, truth: JointModel, true: ParameterValues) -> np.ndarray:
+    def _expected_stderrs(self, truth: JointWindowModel, true: ParameterValues) -> np.ndarray:
         """Compute standard errors from the Fisher information and the known noise."""
         correlations = _correlations(self.process, self.rows)
         jacobian = truth.compute_jacobian(true, self._free_parameters)

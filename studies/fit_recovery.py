@@ -22,7 +22,7 @@ from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, PARAMETERS, scene_to_parameters
 from rsfstudy.fitting.fit_problem import FitProblem
-from rsfstudy.fitting.joint_model import JointModel
+from rsfstudy.fitting.joint_window_model import JointWindowModel
 from rsfstudy.fitting.window_model import ParameterValues, WindowModel
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
 from rsfstudy.motion import Integrator
@@ -172,7 +172,7 @@ class RecoveryError(Measure):
             n: v * INITIAL_FACTORS.get(n, 1.0) + INITIAL_OFFSETS.get(n, 0.0) if n in free else v
             for n, v in true.items()
         }
-        found = FitProblem(JointModel((model,)), first, free, "white").solve()
+        found = FitProblem(JointWindowModel((model,)), first, free, "white").solve()
         sizes = {name: _parameter_scale(name, true) for name in free}
         off = {name: (found.parameter_values[name] - true[name]) / sizes[name] for name in free}
         values: dict[str, OutputValue] = {

@@ -22,7 +22,7 @@ settings.load_profile("default")
 os.environ.setdefault("MPLBACKEND", "agg")
 # The console determines its width when it is created.
 os.environ.pop("COLUMNS", None)
-importlib.import_module("rsfstudy.cli.console")
+importlib.import_module("rsfstudy.cli.console_output")
 # Without bytecode files, each of the hundred processes that the tests start would compile the
 # package again, which takes a second per process.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

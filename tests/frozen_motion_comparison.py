@@ -20,7 +20,7 @@ from frozen_scenes import MOTIONS, Motion, Track
 
 from rsfstudy import Scene
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.events import EventKind
+from rsfstudy.motion.integration_events import EventKind
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.slider.motion_point import MotionPoint
 

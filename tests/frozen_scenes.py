@@ -18,7 +18,7 @@ import numpy as np
 
 from rsfstudy import Scene, protocol
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import (
+from rsfstudy.motion.integration_events import (
     EventKind,
     EventSpecification,
     approach_to_steady_state,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.events import (
+from rsfstudy.motion.integration_events import (
     Event,
     EventKind,
     EventSpecification,

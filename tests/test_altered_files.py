@@ -18,7 +18,7 @@ from study_runs import FAULTY_STUDY_FILE, example_claim, run, run_command
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.cli.console import stdout_console
+from rsfstudy.cli.console_output import stdout_console
 from rsfstudy.errors import DataError, InvalidValue, RunError
 from rsfstudy.reductions import LinearFit
 from rsfstudy.responses.linear_stability import LinearStability

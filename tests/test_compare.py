@@ -91,7 +91,7 @@ def test_codes_are_compared_though_they_have_no_errors(two):
         dataset["mode"] = dataset[NUMBER].copy(data=dataset[NUMBER].values * 0.0 + code)
         dataset["mode"].attrs = codes
     assert rsfstudy.compare(first, first).agrees
-    assert rsfstudy.compare(first, second).variables_beyond_errors == ["mode"]
+    assert rsfstudy.compare(first, second).variables_differing_beyond_errors == ["mode"]
 
 
 def test_points_of_one_name_must_hold_the_same(two):

@@ -309,7 +309,7 @@ def test_a_cache_of_other_code_is_never_used(monkeypatch):
     rate = build_equations_between_ruptures(scene, with_time=False).rate_function
     before = compile_cache.compute_code_digest(None, rate)
     assert compile_cache.compute_code_digest(None, rate) == before
-    cells = scene.friction_functions.strength.__closure__
+    cells = scene.friction_law_functions.strength.__closure__
     effect = next(
         c.cell_contents
         for c in cells

@@ -24,9 +24,9 @@ from rsfstudy.slider.equations import (
     build_equations_against_displacement,
     build_equations_between_ruptures,
 )
+from rsfstudy.slider.integration_path_length import compute_displacement_per_path_length
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.path_length import compute_displacement_per_path_length
 from rsfstudy.status import Status
 
 

@@ -143,7 +143,7 @@ def test_the_same_functions_serve_all_scenes_of_the_same_parts():
 def test_scenes_of_the_same_parts_share_all_functions(parts):
     """Equations of a new scene need no new functions, so nothing is compiled again."""
     one, other = (Scene(**parts, a=a, stiffness=0.01) for a in (0.01, 0.012))
-    assert one.friction_functions == other.friction_functions
+    assert one.friction_law_functions == other.friction_law_functions
     builders = [
         lambda scene: build_equations_between_ruptures(scene, with_time=True),
         lambda scene: build_equations_without_mass(scene, with_time=False),

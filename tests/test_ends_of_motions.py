@@ -14,7 +14,7 @@ from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability
 from rsfstudy.errors import IncompleteWarning, NoResultWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.events import EventKind, rise
+from rsfstudy.motion.integration_events import EventKind, rise
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.regime_switching import (
     CONTINUES,

@@ -16,8 +16,8 @@ from study_runs import study_of
 import rsfstudy
 from rsfstudy import Axis, Figure, Panel, Rig, Scene, Segment, measures, reductions
 from rsfstudy.argument_checks import MAX_ITEMS_OF_LIST_ARGUMENT, describe_type, matches_annotation
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import CallError, DataError, IncompleteWarning, InvalidValue, RsfStudyError
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.measures import Measure
 from rsfstudy.quantities import HtmlMarkup
 from rsfstudy.reductions import ClosedFormRatio, LinearFit, PowerLaw, Range
@@ -85,7 +85,7 @@ def test_a_guarded_object_can_be_pickled(record):
 
 
 def test_calls_from_inside_rsfstudy_keep_the_original_exception():
-    inner = error_boundary(lambda: {}["a"])
+    inner = raise_only_rsfstudy_errors(lambda: {}["a"])
     with pytest.raises(InvalidValue, match="failed for these arguments"):
         inner()
     caller = {"__name__": "rsfstudy.somewhere", "inner": inner}

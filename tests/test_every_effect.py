@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.integration_events import EventKind, maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import laws, stability, steady_state

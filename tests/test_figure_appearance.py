@@ -284,7 +284,7 @@ def test_posterior_draws_are_a_corner_plot():
         },
         {"parameter": ["a", "slip_distance"], "draw": np.arange(30)},
     )
-    figure, drawn = corner_plots.posterior_figure(dataset)
+    figure, drawn = corner_plots.build_posterior_corner_figure(dataset)
     assert figure.subplot_positions == [0, 2, 3]
     assert figure.panels[1].y_label == r"$D_c$ ($\mu$m)"
     assert np.array_equal(drawn.slip_distance, dataset.posterior[:, 1])

@@ -28,7 +28,7 @@ from synthetic_records import (
 import rsfstudy
 from rsfstudy import Axis, Scene
 from rsfstudy.errors import IncompleteWarning, InvalidValue
-from rsfstudy.fitting.joint_model import JointModel
+from rsfstudy.fitting.joint_window_model import JointWindowModel
 from rsfstudy.fitting.window_model import WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
@@ -77,7 +77,7 @@ def test_derivatives_of_windows_are_differences() -> None:
         pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
         moved = synthetic.load_point_displacement(loading, times)
         parts.append(WindowModel(scene, times, moved, 0.0 * times, pieces, integrator))
-    joint = JointModel(tuple(parts))
+    joint = JointWindowModel(tuple(parts))
     plainly = {n: EXACT_PARAMETERS[n] for n in ("a", "b", "slip_distance", "stiffness")}
     values = plainly | {"mu_star_1": 0.6, "mu_star_2": 0.5, "trend1_1": 1e-5, "trend1_2": -2e-5}
     free = ("a", "slip_distance", "mu_star_2", "trend1_1")

@@ -19,7 +19,7 @@ from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINE_NAMES
-from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.integration_events import EventKind, maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, MotionRecorder
 from rsfstudy.responses.step_response import StepResponse
@@ -313,7 +313,7 @@ def test_pressure_at_any_slip_rate_stays_below_its_bound(dilatancy, length):
         for n, now in enumerate(states[:-1]):
             for end in range(n + 1, len(states)):
                 highest = max(pressure for _porosity, pressure in states[n : end + 1])
-                bound = fluid.highest_pressure(float(rates[n:end].max()), now)
+                bound = fluid.compute_pore_pressure_upper_bound(float(rates[n:end].max()), now)
                 assert highest <= bound * (1.0 + 1e-12)
 
 

@@ -18,7 +18,7 @@ from frozen_scenes import MOTIONS
 
 from rsfstudy import Scene
 from rsfstudy.motion.engines import ENGINE_NAMES
-from rsfstudy.motion.events import EventKind
+from rsfstudy.motion.integration_events import EventKind
 from rsfstudy.slider.part_registry import PART_SLOTS
 
 #: Tolerance of the differences from ``frozen_motion_comparison.largest_differences``. The last

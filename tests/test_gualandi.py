@@ -21,7 +21,7 @@ import rsfstudy
 from rsfstudy.errors import RsfStudyWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.integration_events import EventKind, maximum
 from rsfstudy.motion.integrator import Integrator
 
 #: Parameters in SI units: atmospheric pressure, slip distance, velocity, direct effect, friction.

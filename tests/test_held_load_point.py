@@ -14,7 +14,7 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.triggered_instability import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.events import fall, maximum
+from rsfstudy.motion.integration_events import fall, maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.status import Status
 
@@ -129,7 +129,7 @@ def test_pore_pressure_stays_below_its_bound(law, drainage, dilatancy, length):
         )
     ]
     assert len(points) > 4
-    bound = scene.parts.fluid.highest_pressure
+    bound = scene.parts.fluid.compute_pore_pressure_upper_bound
     for now, point in enumerate(points):
         to_come = points[now:]
         highest = max(later.log_slip_rate for later in to_come)

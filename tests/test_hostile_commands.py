@@ -19,7 +19,7 @@ from study_runs import call_main, run_command
 
 from rsfstudy.cli import command_line
 from rsfstudy.cli.command_line import cli
-from rsfstudy.cli.console import LiteralTextConsole
+from rsfstudy.cli.console_output import LiteralTextConsole
 
 LONG = "x" * 300
 TOO_LONG = "must have at most 255 bytes in each part"

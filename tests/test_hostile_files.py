@@ -24,7 +24,7 @@ from test_files import LAYOUT
 
 import rsfstudy
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.referee import problem_files
+from rsfstudy.referee import benchmark_problem_files
 from rsfstudy.storage import dataset_files
 from rsfstudy.storage.cell_journal import CellJournal, CellWallTimes
 
@@ -102,7 +102,7 @@ def test_few_choices_are_compared_with_a_value(monkeypatch) -> None:
 def test_toml_that_cannot_be_parsed_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "deep.toml").write_text(text)
     with pytest.raises(DataError, match="deep.toml: cannot be read as TOML"):
-        problem_files.read_problem(tmp_path / "deep.toml")
+        benchmark_problem_files.read_problem(tmp_path / "deep.toml")
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from rsfstudy import Scene
 from rsfstudy.cli import command_results, commands, study_results
 from rsfstudy.cli.command_group import CommandGroup
 from rsfstudy.cli.command_line import cli
-from rsfstudy.referee.problem_files import find_shipped_problem_files
+from rsfstudy.referee.benchmark_problem_files import find_shipped_problem_files
 from rsfstudy.storage import dataset_files
 
 TEXT = (PAGES / "reference" / "json.md").read_text()

@@ -42,7 +42,7 @@ def test_scales_by_dimension():
         "sigma_*": (1, -1, -2), "D_c": (0, 1, 0), "V_*": (0, 1, -1), "D_c/V_*": (0, 0, 1),
         "V_*/D_c": (0, 0, -1), "sigma_*/D_c": (1, -2, -2),
     }  # fmt: skip
-    for name, scale in RIG.scales.items():
+    for name, scale in RIG.si_scale_by_dimensionless_unit.items():
         assert scale.factor == pytest.approx(SCALES[name], rel=1e-15)
         total = np.zeros(3)
         for text in scale.units.split():

@@ -10,20 +10,20 @@ from rsfstudy.named_studies._normal_stress_transient import NormalStressTransien
 
 from rsfstudy import Scene, simulate
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
+from rsfstudy.critical_steps.monotone_slip_rate_rise_check import (
     build_single_state_evolution_function,
 )
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.integration_events import EventKind, approach_to_steady_state
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import laws, steady_state
 from rsfstudy.slider.friction import build_state_evolution_function, compute_steady_states
+from rsfstudy.slider.integration_path_length import compute_velocity_ratios
 from rsfstudy.slider.laws.composite import compute_lambert_w
-from rsfstudy.slider.path_length import compute_velocity_ratios
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
@@ -75,7 +75,7 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_slip_rate, log_th
     def evolving(law: str) -> float:
         scene = Scene(law=law, a=0.5 * b, load_velocity_ratio=load)
         x, _slower, share = compute_velocity_ratios(log_slip_rate, scene.parameter_values)
-        return scene.friction_functions.state_evolutions(
+        return scene.friction_law_functions.state_evolutions(
             x, (b * log_theta,), 0.0, share, scene.parameter_values
         )[0]
 

@@ -27,7 +27,7 @@ FLOORS = (
     ("errors", "status", "defaults", "formatting", "_lazy_exports", "_former_modules"),
     ("object_digest",),
     ("argument_checks",),
-    ("error_boundary",),
+    ("exception_conversion",),
     ("former_data_names", "netcdf_encoding", "path_checks", "quantities"),
     ("slider",),
     ("parts", "vocabulary"),
@@ -69,7 +69,7 @@ HOMES = {
         "storage/stored_declarations",
         "storage/plain_data_conversion",
         "storage/study_reconstruction",
-        "referee/problem_files",
+        "referee/benchmark_problem_files",
     },
 }
 

@@ -12,7 +12,14 @@ from rsfstudy import Scene, simulate
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import EventKind, approach_to_steady_state, fall, maximum, minimum, rise
+from rsfstudy.motion.integration_events import (
+    EventKind,
+    approach_to_steady_state,
+    fall,
+    maximum,
+    minimum,
+    rise,
+)
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.responses.linear_stability import LinearStability
@@ -163,7 +170,7 @@ def test_no_strength_is_the_scene_without_the_effect(idle, still, law):
     scene = plain.with_(**idle)
     assert scene == plain
     assert scene.parameter_values == plain.parameter_values
-    assert scene.friction_functions == plain.friction_functions
+    assert scene.friction_law_functions == plain.friction_law_functions
     assert scene.state_count == plain.state_count
 
 

@@ -13,7 +13,7 @@ from site_pages import PAGES
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
+from rsfstudy.critical_steps.monotone_slip_rate_rise_check import (
     build_single_state_evolution_function,
 )
 from rsfstudy.slider.friction import build_friction_relation

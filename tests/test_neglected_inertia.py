@@ -7,11 +7,11 @@ import pytest
 
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import maximum
+from rsfstudy.motion.integration_events import maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
 from rsfstudy.motion.recording import REGIME_COLUMN, MotionRecorder
-from rsfstudy.responses._motion_quantities import compute_growth_rate_along_path
+from rsfstudy.responses._motion_quantities import compute_log_slip_rate_slope_along_path
 from rsfstudy.responses.healing import Healing
 from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider.equations import RUPTURE_REGIME
@@ -111,7 +111,7 @@ def test_growth_at_a_peak_has_one_unit_in_both_regimes():
         integrator = Integrator(Accuracy(rtol, 10_000_000, engine="compiled"))
         events = list(integrator.follow(scene, [wanted]))
         peak = next(event for event in events if event.specification == wanted)
-        growths[peak.regime] = compute_growth_rate_along_path(scene, peak, 8.22991)
+        growths[peak.regime] = compute_log_slip_rate_slope_along_path(scene, peak, 8.22991)
     assert set(growths) == {RUPTURE_REGIME, scene.dynamics.regime_name}
     first, second = growths.values()
     assert math.isclose(first, second, rel_tol=1e-2)

@@ -17,7 +17,7 @@ from rsfstudy import Accuracy, Axis, Integrator, Scene, Study, measures
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import EventStatistics, LimitCycle, Measure
 from rsfstudy.motion import rise
-from rsfstudy.motion.events import EventKind
+from rsfstudy.motion.integration_events import EventKind
 from rsfstudy.slider.noise_paths import UnitNoisePath
 from rsfstudy.status import Status
 

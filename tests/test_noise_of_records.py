@@ -13,8 +13,8 @@ from scipy.linalg import block_diag, toeplitz
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from rsfstudy.fitting import noise as noises
-from rsfstudy.fitting.noise import NoiseModel
+from rsfstudy.fitting import noise_models as noises
+from rsfstudy.fitting.noise_models import NoiseModel
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
 from rsfstudy.fitting.uniform_sampling_runs import (
     UniformSamplingRun,

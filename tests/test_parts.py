@@ -83,10 +83,10 @@ def test_a_part_with_equations_of_its_own_inherits_no_conclusions():
     assert own.critical_stiffness == pytest.approx(half.critical_stiffness, rel=1e-12)
     assert half.parts.normal_stress.coupling[1] == 0.2
     assert own.parts.normal_stress.coupling is None
-    assert own.parts.normal_stress.min_frictional_stress(own) == -math.inf
+    assert own.parts.normal_stress.compute_frictional_stress_lower_bound(own) == -math.inf
     told = LinearStability()(own, Accuracy()).values
     assert told["critical_stiffness"] == pytest.approx(half.critical_stiffness, rel=1e-9)
     assert math.isnan(told["critical_stiffness_explicit"])
     assert Triggers()(own, Accuracy()).status is Status.NOT_APPLICABLE
-    assert LeakyFault().highest_pressure(0.0, (0.0, 0.0)) == math.inf
-    assert DilatantFluid().highest_pressure(0.0, (0.0, 0.0)) < math.inf
+    assert LeakyFault().compute_pore_pressure_upper_bound(0.0, (0.0, 0.0)) == math.inf
+    assert DilatantFluid().compute_pore_pressure_upper_bound(0.0, (0.0, 0.0)) < math.inf

@@ -96,7 +96,8 @@ def test_periods(ratio, period):
     assert orbit.period_in_cycles == period
     assert orbit.is_attracting
     begin, end = map(
-        extract_section_coordinates, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point)
+        extract_section_coordinates,
+        (orbit.cycles[0].motion_point_at_start, orbit.cycles[-1].motion_point_at_end),
     )
     assert np.abs(end - begin).max() < 1e-6 * scene.a
     # The orbit covers the whole period, and the outputs belong to its largest event.
@@ -115,7 +116,8 @@ def test_periods(ratio, period):
     # change of spring stress.
     slips = [
         cycle.recurrence_interval
-        - (cycle.end_point.spring_stress - cycle.start_point.spring_stress) / scene.stiffness
+        - (cycle.motion_point_at_end.spring_stress - cycle.motion_point_at_start.spring_stress)
+        / scene.stiffness
         for cycle in orbit.cycles
     ]
     assert found.values["slip_per_event"] == pytest.approx(slips[0], rel=1e-6)
@@ -189,10 +191,10 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
     seen = came_to(scene, transient + events, 1e-7, follow_all_cycles=True).cycles
     by = ReturnMap(scene, Integrator(quick(1e-7)))
-    monkeypatch.setattr(return_map, "FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE", 3e-5)
+    monkeypatch.setattr(return_map, "DIFFERENCE_STEP_OVER_LOG_RATE_RANGE", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:
-        begin = extract_section_coordinates(cycle.start_point)
+        begin = extract_section_coordinates(cycle.motion_point_at_start)
         (slopes,) = by.compute_return_map_derivatives_per_cycle(
             begin, 1, scene.a * cycle.log_slip_rate_range
         )

@@ -16,7 +16,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINE_NAMES
-from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.integration_events import EventKind, maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.responses.velocity_step import VelocityStep

@@ -29,7 +29,7 @@ from rsfstudy import Axis, Rig, Scene, Study, read_record
 from rsfstudy.cli import command_line
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.fitting.record import Record
-from rsfstudy.referee.problem_files import find_shipped_problem_files
+from rsfstudy.referee.benchmark_problem_files import find_shipped_problem_files
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.part_registry import SCENE_FIELD_NAMES
 from rsfstudy.storage import cell_journal

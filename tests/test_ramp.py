@@ -14,7 +14,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
-from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.integration_events import EventKind, approach_to_steady_state
 from rsfstudy.motion.integrator import Integrator
 
 IMPOSED = {"law": "slowness", "normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 3.0}

@@ -25,7 +25,7 @@ import rsfstudy
 from rsfstudy.errors import CallError, DataError, InvalidValue
 from rsfstudy.rig import readers
 from rsfstudy.rig.readers import spreadsheets, text_layout
-from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
+from rsfstudy.rig.readers.tables_from_files_or_objects import LazyTable, TableSource
 from rsfstudy.rig.table_columns import Column
 
 ROWS = 40

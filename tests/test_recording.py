@@ -15,7 +15,7 @@ from rsfstudy import Scene, protocol, simulate
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
-from rsfstudy.motion.events import Event, EventKind
+from rsfstudy.motion.integration_events import Event, EventKind
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.motion_resampling import resample_motion_along_path
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLE_NAMES, MotionRecorder

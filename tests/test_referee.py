@@ -28,7 +28,7 @@ from rsfstudy.referee.answer_comparison import (
     compare_answers,
     read_or_compute_known_answer,
 )
-from rsfstudy.referee.problem_files import (
+from rsfstudy.referee.benchmark_problem_files import (
     BenchmarkProblem,
     find_shipped_problem_files,
     read_problem,
@@ -94,7 +94,7 @@ def test_files_of_problems_hold_all_that_they_are_asked_for(number):
 
 # ---- ours ----------------------------------------------------------------------------------------
 def told_of(
-    table: reference_answers.AnswerColumnByQuantity,
+    table: reference_answers.AnswerValuesByQuantity,
 ) -> dict[str, external_answers.ReportedQuantity]:
     return {name: external_answers.ReportedQuantity(values, 0.0) for name, values in table.items()}
 

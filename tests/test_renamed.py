@@ -19,14 +19,14 @@ from rsfstudy._deprecation import (
     NEW_NAME_BY_OWNER_AND_FORMER_NAME,
     accept_former_keyword_names,
     add_former_member_names,
-    add_new_names_for_former_overrides,
+    copy_former_overrides_to_new_names,
     translate_former_member_name,
 )
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.fitting.record import Record
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion import array_layout
-from rsfstudy.motion.events import maximum
+from rsfstudy.motion.integration_events import maximum
 from rsfstudy.motion.python_backend import PythonMotionState
 from rsfstudy.quantities import Output
 from rsfstudy.reductions import Reduction
@@ -184,7 +184,7 @@ def test_helpers_leave_other_names_alone(monkeypatch):
     with pytest.warns(DeprecationWarning, match=r"'old' of Kind\(\) is now called 'new'"):
         assert kind(old=5).new == 5
     assert translate_former_member_name(kind, "other") == "other"
-    add_new_names_for_former_overrides(kind)
+    copy_former_overrides_to_new_names(kind)
 
 
 def test_former_keywords_are_passed_on_under_the_new_names():

@@ -10,7 +10,7 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
-from rsfstudy.motion.events import EventKind, maximum, minimum
+from rsfstudy.motion.integration_events import EventKind, maximum, minimum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses._motion_quantities import choose_friction_quantity_for_events
 from rsfstudy.responses.linear_stability import LinearStability

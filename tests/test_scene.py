@@ -90,9 +90,14 @@ def test_tab_completion_offers_what_users_call_and_nothing_else():
     assert all(callable(getattr(rsfstudy, name)) for name in dir(rsfstudy))
     offered = dir(Scene(normal_stress="constant", stiffness=0.02))
     assert {"a", "law", "stiffness", "stiffness_ratio", "b", "parts", "with_"} <= set(offered)
-    assert not {"alpha", "phi", "friction_functions", "combination", "_layout", "__init__"} & set(
-        offered
-    )
+    assert not {
+        "alpha",
+        "phi",
+        "friction_law_functions",
+        "combination",
+        "_layout",
+        "__init__",
+    } & set(offered)
     assert {"alpha", "phi"} <= set(dir(Scene()))
 
 

@@ -13,7 +13,7 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measure_base.steady_sliding_stability import is_steady_sliding_linearly_stable
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
-from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
+from rsfstudy.motion.integration_events import EventKind, approach_to_steady_state, rise
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.quantities import Quantity

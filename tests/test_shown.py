@@ -15,7 +15,7 @@ from study_runs import call_main, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.cli.console import LiteralTextConsole
+from rsfstudy.cli.console_output import LiteralTextConsole
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.quantities import HtmlMarkup, format_symbol_as_html

@@ -209,6 +209,6 @@ def test_stress_keeps_its_sign_however_weak_a_regularised_fault_becomes(excess):
     """
     scene = Scene(regularised=True, mu_star=0.05, normal_stress="constant")
     mu = scene.a * math.asinh(0.5 * math.exp((scene.mu_star + excess) / scene.a))
-    assert steady_state.compute_frictional_stress_after_jump(
+    assert steady_state.compute_frictional_stress_from_strength(
         scene, excess
     ) + scene.mu_star == pytest.approx(mu, rel=1e-9)

@@ -18,10 +18,10 @@ from rsfstudy.formatting import format_overrides
 from rsfstudy.measures import Outcome
 from rsfstudy.reporting import (
     cell_tables,
+    claim_verdict_tables,
     json_summaries,
     lattice_tables,
     reduction_tables,
-    verdict_tables,
 )
 from rsfstudy.reporting.text_tables import TextTable
 from rsfstudy.status import Status
@@ -73,7 +73,7 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
         *reduction_tables.build_reduction_tables(dataset),
         json_summaries.build_result_variables_table(dataset),
     ]
-    shown += [verdict_tables.build_claims_table(study_runs.check(dataset))]
+    shown += [claim_verdict_tables.build_claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):
         for width in WIDTHS:
             lines = printed(width, table_layout.print_table_or_sentence, table)
@@ -143,7 +143,7 @@ def test_notebooks_show_the_same_claims(tmp_path_factory):
     dataset, _path = named_results("rate_step_boundary", tmp_path_factory)
     found = rsfstudy.check(dataset)
     shown = of_html(found._repr_html_())
-    told = verdict_tables.build_claims_table(found).rows
+    told = claim_verdict_tables.build_claims_table(found).rows
     assert [list(row.values()) for row in told] == [list(row) for row in shown[1:]]
     assert call_main("check", _path).returncode == 0
 

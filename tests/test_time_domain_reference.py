@@ -15,7 +15,7 @@ from time_domain_reference import TimeDomainMotion, rows_to_columns
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINE_NAMES, PYTHON, SCIPY
-from rsfstudy.motion.events import fall, maximum, minimum, rise
+from rsfstudy.motion.integration_events import fall, maximum, minimum, rise
 from rsfstudy.motion.integrator import Integrator
 
 CONSTANT, IMPOSED = {"normal_stress": "constant"}, {"normal_stress": "imposed", "alpha": 0.3}

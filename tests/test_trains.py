@@ -14,7 +14,7 @@ from rsfstudy import Scene, history, simulate
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
-from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.integration_events import EventKind, approach_to_steady_state
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider.laws import BUILT_IN_LAW_CLASS_BY_NAME as LAWS
 

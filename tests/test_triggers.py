@@ -7,14 +7,14 @@ from rsfstudy.named_studies._critical_triggers import TRIGGERS, Triggers
 
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
+from rsfstudy.critical_steps.monotone_slip_rate_rise_check import (
     build_events_testing_monotone_rise,
     is_slip_rate_rise_monotone,
 )
 from rsfstudy.critical_steps.triggered_instability import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
-from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum
+from rsfstudy.motion.integration_events import EventKind, approach_to_steady_state, maximum
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.status import Status
 

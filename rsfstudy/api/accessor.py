@@ -13,8 +13,8 @@ import xarray as xr
 from xarray.backends import BackendEntrypoint
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.former_data_names import rename_former_variables
 
 # Other modules are imported inside the methods, because xarray imports this module even if it opens
@@ -65,7 +65,7 @@ class DatasetAccessor:
         """
         self._dataset = rename_former_variables(dataset)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def _repr_html_(self) -> str:
         """Return the dataset and the verdicts of its claims as HTML."""
         from rsfstudy.api import html_report
@@ -74,7 +74,7 @@ class DatasetAccessor:
         return html_report.format_dataset_as_html(self._dataset)
 
     @property
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def scene(self) -> Scene:
         """Scene of the dataset.
 
@@ -106,7 +106,7 @@ class DatasetAccessor:
         )
 
     @property
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def rig(self) -> Rig:
         """Rig of a fit, used to convert motions to the units of the record.
 
@@ -133,7 +133,7 @@ class DatasetAccessor:
         return build_fitted_rig(self._dataset)
 
     @property
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def study(self) -> Study:
         """Study that produced the dataset.
 
@@ -156,7 +156,7 @@ class DatasetAccessor:
         self._require_study_results()
         return StoredDataset(self._dataset).study
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def to_si(self, **scale_values: Any) -> xr.Dataset:
         """Convert the dataset to SI units.
 
@@ -191,7 +191,7 @@ class DatasetAccessor:
         self._require_rsfstudy_dataset()
         return to_si(self._dataset, **scale_values)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def in_units(self, *, stress: str = "MPa", length: str = "um", time: str = "s") -> xr.Dataset:
         """Convert the results of a study with a rig to other units.
 
@@ -243,7 +243,7 @@ class DatasetAccessor:
         self._require_rsfstudy_dataset()
         return DatasetUnits(self._dataset).convert_to_units(stress, length, time)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def check(self) -> pd.DataFrame:
         """Compare the dataset with the claims of its study.
 
@@ -265,7 +265,7 @@ class DatasetAccessor:
         self._require_all_axes_present("claims are checked against")
         return study_runs.check(self._dataset)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def plot(self, *plot_arguments: Any, **plot_options: Any) -> Figure:
         """Plot the results of a study, a motion or a limit cycle.
 
@@ -300,7 +300,7 @@ class DatasetAccessor:
             return study_runs.plot(self._dataset, *plot_arguments, **plot_options)
         return plot_motion(self._dataset, *plot_arguments, **plot_options)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def events(self, slip_rate: float | None = None) -> xr.Dataset:
         """Find the events of a motion.
 
@@ -340,16 +340,16 @@ class DatasetAccessor:
         >>> events["time"].values.round(3)
         array([0.2])
         """
-        from rsfstudy.api.motion_events import find_motion_events
+        from rsfstudy.api.slip_events_of_motion import find_slip_events_of_motion
 
         if self._contains_study_results:
             raise DataError(
                 "the dataset contains the results of a study, but events require the "
                 "motion of one scene"
             )
-        return find_motion_events(self._dataset, slip_rate, lambda: self.scene)
+        return find_slip_events_of_motion(self._dataset, slip_rate, lambda: self.scene)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def holds(self) -> xr.Dataset:
         """Measure frictional healing and relaxation during each hold of a motion.
 
@@ -384,7 +384,7 @@ class DatasetAccessor:
             )
         return measure_holds_of_motion(self._dataset)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def slip_mode(self, stick_slip_from: Any) -> xr.DataArray:
         """Classify limit cycles by their peak slip rate.
 
@@ -440,7 +440,7 @@ class DatasetAccessor:
         modes, slow = self._dataset["slip_mode"], LimitCycle.SLIP_MODES.index("slow_slip")
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def simplify(self) -> xr.Dataset:
         """Return a simplified copy for plotting and tabulating with plain xarray.
 
@@ -469,12 +469,12 @@ class DatasetAccessor:
         >>> list(motion.coords), motion["slip"].attrs["units"]
         (['time', 'slip'], 'D_c')
         """
-        from rsfstudy.api.dataset_simplification import omit_constants_and_simplify_units
+        from rsfstudy.api.constant_coordinate_omission import omit_constants_and_simplify_units
 
         self._require_rsfstudy_dataset()
         return omit_constants_and_simplify_units(self._dataset)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def to_dataframe(self, *, decoded: bool = False) -> pd.DataFrame:
         """Convert the dataset to a table, and omit constant columns.
 
@@ -515,7 +515,7 @@ class DatasetAccessor:
         self._require_rsfstudy_dataset()
         return to_dataframe(self._dataset, decoded)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def fit_table(self) -> pd.DataFrame:
         """Return a table of fits with the column names used in laboratories.
 
@@ -537,7 +537,7 @@ class DatasetAccessor:
 
         return build_fit_table(self._dataset)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def sample_parameters(self, n: int, seed: int = 0, *, posterior: bool = False) -> xr.Dataset:
         """Draw samples of the parameters of a fit.
 
@@ -573,7 +573,7 @@ class DatasetAccessor:
 
         return sample_fitted_parameters(self._dataset, n, seed, posterior=posterior)
 
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def failures(self) -> pd.DataFrame:
         """Return a table of the cells without a result.
 

@@ -91,7 +91,7 @@ def rerun_and_compare_motion(motion: xr.Dataset) -> pd.DataFrame:
             f"scene ({title}). To recompute it, call {call}, rtol={about.get('rtol', '...')}) "
             "with the original options."
         )
-    if DatasetUnits.SCALES_ATTRIBUTE_NAME in about and "laboratory" not in about:
+    if DatasetUnits.UNIT_SCALES_ATTRIBUTE_NAME in about and "laboratory" not in about:
         raise DataError(
             "the units of the motion were converted without a rig. Store the motion before the "
             "units are converted, or convert the units with a rig"

@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.api.stress_records import StressRecord, read_stress_record
-from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import InvalidValue, NoResultWarning
+from rsfstudy.exception_conversion import find_stacklevel_of_user_code, raise_only_rsfstudy_errors
 from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.fitting import (
     EVENT_QUANTITIES,
@@ -26,7 +26,7 @@ from rsfstudy.rig import RecordReadingOptions, compute_conversion_factor, conver
 
 #: Mapping from the scale of a quantity to a variable of the record. The quantity has the units of
 #: this variable.
-_VARIABLE_PROVIDING_UNITS_BY_SCALE = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
+_VARIABLE_WITH_UNITS_BY_SCALE_SYMBOL = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
 #: Quantities of an event that can be computed only if displacement is known.
 _QUANTITIES_REQUIRING_DISPLACEMENT = ("slip", "peak_slip_rate", "dynamic_stress_drop")
 #: Meanings of the codes 0, 1, 2 and 3 of the variable ``cut``.
@@ -68,7 +68,7 @@ def build_event_catalogue(
         if rows and name not in rows[0]:
             continue
         values, errors = np.array([row[name] for row in rows]).reshape(-1, 2).T
-        units = _build_unit_attributes(scale, variable_attributes)
+        units = _build_units_and_scale_attributes(scale, variable_attributes)
         dataset[name] = "event", values, {"long_name": words, **units}
         of_error = {"long_name": f"error estimate of {words}", **units}
         dataset[f"{name}_error"] = "event", errors, of_error
@@ -91,20 +91,20 @@ def build_event_catalogue(
     )
 
 
-def _build_unit_attributes(
-    scale: str, variable_attributes: Mapping[str, Mapping[Any, Any]]
+def _build_units_and_scale_attributes(
+    scale_symbol: str, variable_attributes: Mapping[str, Mapping[Any, Any]]
 ) -> dict[str, str]:
-    """Return the attributes ``units`` and ``scale`` of an event quantity.
+    """Return the attributes ``units`` and ``scale_symbol`` of an event quantity.
 
     Times, slips and stresses have the units of the corresponding variable of the record. The units
     of a slip rate are the units of slip divided by the units of time. All other quantities are
     dimensionless.
     """
-    if scale in _VARIABLE_PROVIDING_UNITS_BY_SCALE:
-        source = variable_attributes[_VARIABLE_PROVIDING_UNITS_BY_SCALE[scale]]
+    if scale_symbol in _VARIABLE_WITH_UNITS_BY_SCALE_SYMBOL:
+        source = variable_attributes[_VARIABLE_WITH_UNITS_BY_SCALE_SYMBOL[scale_symbol]]
         return {key: str(source[key]) for key in ("units", "scale") if key in source}
-    if not scale or "scale" in variable_attributes["slip"]:
-        return {"units": "1", **({"scale": scale} if scale else {})}
+    if not scale_symbol or "scale" in variable_attributes["slip"]:
+        return {"units": "1", **({"scale": scale_symbol} if scale_symbol else {})}
     time, slip = (variable_attributes[name].get("units") for name in ("time", "slip"))
     return {"units": f"{slip} {time}-1"} if time and slip else {}
 
@@ -112,7 +112,7 @@ def _build_unit_attributes(
 # ---- detection of drops in records --------------------------------------------------------------
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def events(
     record: Any = None,
     columns: Mapping[str, Any] | None = None,

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.api.motion_events import InterpolatedMotionRows
-from rsfstudy.error_boundary import error_boundary
+from rsfstudy.api.slip_events_of_motion import InterpolatorBetweenMotionRows
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.fitting import MAX_HOLD_OVER_SLIDING_VELOCITY, Record, build_hold_table
 from rsfstudy.rig import read_record
@@ -23,13 +23,13 @@ _MOTION_VARIABLES_FOR_HEALING = (
 )
 #: Friction has a peak if friction falls after its maximum by more than this multiple of the
 #: relative tolerance of the motion.
-_MIN_POST_PEAK_FALL_OVER_RTOL = 10.0
+_MIN_POST_PEAK_FRICTION_FALL_OVER_RTOL = 10.0
 #: Largest relative difference between load point velocities that are treated as equal, because the
 #: difference is due to rounding.
 _RTOL_OF_EQUAL_VELOCITIES = 1e-6
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Dataset:
     """Measure frictional healing in a slide-hold-slide test.
 
@@ -111,8 +111,8 @@ def measure_holds_of_motion(motion: xr.Dataset) -> xr.Dataset:
         motion["time"].values,
         np.column_stack([motion[n] for n in _MOTION_VARIABLES_FOR_HEALING]),
     )
-    rows = InterpolatedMotionRows(time, values, 0.0)
-    least = _MIN_POST_PEAK_FALL_OVER_RTOL * float(motion.attrs.get("rtol", 0.0))
+    rows = InterpolatorBetweenMotionRows(time, values, 0.0)
+    least = _MIN_POST_PEAK_FRICTION_FALL_OVER_RTOL * float(motion.attrs.get("rtol", 0.0))
     initial = float(motion.get("slip_rate", 10.0 ** motion["log10_slip_rate"])[0])
     segments = _find_constant_velocity_segments(time, values[:, 1], initial)
     found = [
@@ -134,7 +134,7 @@ def measure_holds_of_motion(motion: xr.Dataset) -> xr.Dataset:
 
 
 def _measure_hold_of_motion(
-    interpolated_rows: InterpolatedMotionRows,
+    interpolated_rows: InterpolatorBetweenMotionRows,
     motion_values: np.ndarray,
     hold_row_numbers: tuple[int, int, int],
     min_friction_fall: float,

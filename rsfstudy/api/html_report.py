@@ -23,8 +23,12 @@ import xarray as xr
 from rsfstudy.api import study_runs
 from rsfstudy.api.result_paths import parse_output_path
 from rsfstudy.defaults import Defaults
-from rsfstudy.error_boundary import check_regular_file, error_boundary, format_exception
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, shorten_text
+from rsfstudy.exception_conversion import (
+    check_regular_file,
+    format_exception,
+    raise_only_rsfstudy_errors,
+)
 from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.formatting import format_count_with_noun, format_overrides
 from rsfstudy.quantities import HtmlMarkup
@@ -66,7 +70,7 @@ class _ReportSectionOfFile:
         return re.sub(r"\W+", "-", self.results_path.name)
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def report(
     directory: str | Path = Defaults.OUTPUT_DIRECTORY, output: str | Path | None = None
 ) -> Path:

@@ -114,8 +114,10 @@ def _make_progress_line_printer(
     return update
 
 
-def compile_equations_with_notice(
-    example_scenes: Sequence[Scene], includes_time_flags: Sequence[bool], is_notice_shown: bool
+def compile_equations_and_print_time(
+    example_scenes: Sequence[Scene],
+    include_time_equation_flags: Sequence[bool],
+    is_notice_shown: bool,
 ) -> None:
     """Compile the equations of scenes, and print the compilation time.
 
@@ -126,7 +128,7 @@ def compile_equations_with_notice(
     ----------
     example_scenes : sequence of Scene
         Scenes whose equations are compiled. Scenes with the same parts share their equations.
-    includes_time_flags : sequence of bool
+    include_time_equation_flags : sequence of bool
         Variants of the equations to compile. True selects the equations with time as a variable.
     is_notice_shown : bool
         If False, nothing is displayed.
@@ -136,7 +138,7 @@ def compile_equations_with_notice(
         replace(Engine.compilation_log),
     )
     with console.status("compiling the equations ..."):
-        for scene, clock in itertools.product(example_scenes, includes_time_flags):
+        for scene, clock in itertools.product(example_scenes, include_time_equation_flags):
             Engine.import_compiled_engine().compile_equations_of_scene(
                 scene, include_time_equation=clock
             )

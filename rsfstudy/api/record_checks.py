@@ -114,7 +114,7 @@ def check_displacement_is_not_slip(
                 raise InvalidValue("displacement", record.name, rule, remedy=remedy)
 
 
-def check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep) -> None:
+def check_step_can_be_fitted(record: Record, step_number: int, loading_step: LoadingStep) -> None:
     """Raise an error if a step cannot be fitted.
 
     Parameters
@@ -123,7 +123,7 @@ def check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep
         Record with the step.
     step_number : int
         Number of the step, for error messages.
-    step : LoadingStep
+    loading_step : LoadingStep
         Step to check.
 
     Raises
@@ -132,16 +132,16 @@ def check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep
         If the step is outside the record, or if the load point does not move forward.
     """
     time, moved = record.time, record.columns["displacement"]
-    if not time[0] < step.start <= step.end < time[-1]:
+    if not time[0] < loading_step.start <= loading_step.end < time[-1]:
         rule = f"is outside {record.name}, which lasts from {time[0]:g} to {time[-1]:g} s"
         remedy = "Specify the times of steps in s, as in the record: record.with_steps([...])."
-        raise InvalidValue(f"step {step_number}", tuple(step), rule, remedy=remedy)
-    if min(step.velocity_before, step.velocity_after) < 0.0 or not moved[-1] > np.interp(
-        step.end, time, moved
-    ):
+        raise InvalidValue(f"step {step_number}", tuple(loading_step), rule, remedy=remedy)
+    if min(loading_step.velocity_before, loading_step.velocity_after) < 0.0 or not moved[
+        -1
+    ] > np.interp(loading_step.end, time, moved):
         told = (
-            f"{step.velocity_before:.4g} um/s before step {step_number}, "
-            f"{step.velocity_after:.4g} um/s after it"
+            f"{loading_step.velocity_before:.4g} um/s before step {step_number}, "
+            f"{loading_step.velocity_after:.4g} um/s after it"
         )
         rule = "must increase, because the load point moves forward"
         remedy = "Reverse the sign, or select other columns: --columns (columns=)."
@@ -149,7 +149,7 @@ def check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep
 
 
 def check_alpha_can_be_fitted(
-    records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
+    records: Sequence[Record], loading_history_source: str, step_numbers: Sequence[int]
 ) -> None:
     """Raise an error if ``alpha`` cannot be fitted.
 
@@ -157,7 +157,7 @@ def check_alpha_can_be_fitted(
     ----------
     records : sequence of Record
         Records to fit.
-    loading_kind : {"steps", "recorded"}
+    loading_history_source : {"steps", "recorded"}
         Loading of the model.
     step_numbers : sequence of int
         Numbers of the steps to fit.
@@ -172,8 +172,10 @@ def check_alpha_can_be_fitted(
         steps = [
             record.loading_steps[n - 1] for n in step_numbers if n <= len(record.loading_steps)
         ]
-        by_steps = loading_kind == "steps" and any(step.stress_ratio != 1.0 for step in steps)
-        if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
+        by_steps = loading_history_source == "steps" and any(
+            step.normal_stress_ratio != 1.0 for step in steps
+        )
+        if not by_steps and not (loading_history_source == "recorded" and np.ptp(stress) > 0.0):
             rule = "cannot be fitted, because the normal stress does not change in the fitted "
             rule += f"steps of record {record.name!r}"
             remedy = "Remove alpha from the free parameters, select a step in normal stress with "

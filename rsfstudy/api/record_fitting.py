@@ -23,8 +23,8 @@ from rsfstudy.api.record_checks import (
 )
 from rsfstudy.axes import Axis
 from rsfstudy.defaults import Defaults
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.execution import ProgressCallback
 from rsfstudy.fitting import (
     LOW_PASS_ORDERS,
@@ -80,7 +80,7 @@ _INITIAL_GUESS_FOR_ONE_STATE_LAWS = {"b_over_a": 1.2}
 _INITIAL_GUESS_FOR_TWO_STATE_LAWS = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def fit(
     record: Record | Sequence[Record],
     rig: Rig | None = None,

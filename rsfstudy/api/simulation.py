@@ -15,8 +15,8 @@ from typing import Any, Never
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import IncompleteWarning, InvalidValue, NoResultWarning, shorten_text
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.motion import (
     Accuracy,
@@ -71,7 +71,7 @@ _BUILT_IN_REGIME_NAMES = (
 )
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 @accept_deprecated_accuracy_and_meter
 def simulate(
     scene: Scene,
@@ -292,7 +292,7 @@ def simulate(
         dataset[_INSTABILITY_TIME_QUANTITY.name] = (
             (),
             passed,
-            _INSTABILITY_TIME_QUANTITY.attributes,
+            _INSTABILITY_TIME_QUANTITY.variable_attributes,
         )
         dataset = dataset.assign_attrs({UNPHYSICAL_MOTION_ATTRIBUTE_NAME: text})
         if is_alone:
@@ -368,7 +368,7 @@ def _convert_recording_to_dataset(
         recorded_rows[:, MotionRecorder.REGIME_COLUMN].astype(np.int8),
         flags,
     )
-    about_rate = find_quantity("reference_rate").attributes
+    about_rate = find_quantity("reference_rate").variable_attributes
     dataset["reference_rate"] = (), scene.reference_rate, about_rate
     return dataset.set_coords(["slip", "reference_rate"])
 
@@ -392,7 +392,7 @@ def build_motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[s
     dict
         Attributes of the variable.
     """
-    attributes = quantity.attributes
+    attributes = quantity.variable_attributes
     if (
         quantity.name in _VARIABLES_DERIVED_FROM_SPRING_STRESS
         and scene.dynamics.radiated_stress_slope(0.0)

@@ -15,8 +15,8 @@ from rsfstudy.api.simulation import (
     check_integrator_is_usable,
     check_is_scene,
 )
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoResultWarning, RsfStudyWarning
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
 from rsfstudy.motion import Accuracy, Engine, Integrator
@@ -27,7 +27,7 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def critical_step(
     scene: Scene,
     of: str = "load_velocity_ratio",
@@ -116,7 +116,7 @@ def critical_step(
     )
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def limit_cycle(
     scene: Scene,
     *,
@@ -192,7 +192,7 @@ def limit_cycle(
     )
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def to_si(
     dataset: xr.Dataset,
     *,
@@ -294,12 +294,12 @@ def _compute_measure_as_dataset(
             build_motion_variable_attributes(find_quantity(name, own), scene),
         )
     work = "rhs_evaluations"
-    variables[work] = (), outcome.rhs_evaluations, find_quantity(work).attributes
-    rate = (), scene.reference_rate, find_quantity("reference_rate").attributes
+    variables[work] = (), outcome.rhs_evaluations, find_quantity(work).variable_attributes
+    rate = (), scene.reference_rate, find_quantity("reference_rate").variable_attributes
     norm = (
         (),
         math.exp(scene.log_instability_rate),
-        find_quantity("instability_slip_rate").attributes,
+        find_quantity("instability_slip_rate").variable_attributes,
     )
     what = measure.name.replace("_", " ").capitalize()
     about = {
@@ -314,7 +314,7 @@ def _compute_measure_as_dataset(
     }
     coordinates: dict[str, Any] = {
         **{
-            name: (name, values, find_quantity(name, own).attributes)
+            name: (name, values, find_quantity(name, own).variable_attributes)
             for name, values in inner.items()
         },
         "reference_rate": rate,

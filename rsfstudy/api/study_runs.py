@@ -17,11 +17,11 @@ import xarray as xr
 
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.api import dataset_export
-from rsfstudy.api.progress import compile_equations_with_notice, show_progress
+from rsfstudy.api.progress import compile_equations_and_print_time, show_progress
 from rsfstudy.api.result_paths import find_results_file, parse_output_path
 from rsfstudy.defaults import Defaults
-from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
+from rsfstudy.exception_conversion import find_stacklevel_of_user_code, raise_only_rsfstudy_errors
 from rsfstudy.execution import (
     OutputOptions,
     ProgressCallback,
@@ -33,7 +33,10 @@ from rsfstudy.measures import Outcome
 from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import HtmlMarkup
-from rsfstudy.reporting import describe_slow_instability_norms, format_notes_on_incomplete_results
+from rsfstudy.reporting import (
+    format_note_on_low_instability_norms,
+    format_notes_on_incomplete_results,
+)
 from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.storage import (
     ResultsComparison,
@@ -62,7 +65,7 @@ class StudiesByName(dict[str, Study]):
         return HtmlMarkup.format_table(("study", "title", "cells", "claims"), rows)
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def studies() -> dict[str, Study]:
     """Return the named studies.
 
@@ -84,8 +87,8 @@ def studies() -> dict[str, Study]:
 _FIT_PROGRESS_DELAY_SECONDS = 20.0
 
 
-@error_boundary
-@SceneFields.add_to_signature()
+@raise_only_rsfstudy_errors
+@SceneFields.decorator_adding_fields_to_signature()
 def run(
     study: str | Path | Study,
     *,
@@ -224,7 +227,7 @@ def run(
         )
     if told := format_notes_on_incomplete_results(results):
         warnings.warn("; ".join(told), IncompleteWarning, stacklevel=find_stacklevel_of_user_code())
-    if slow := describe_slow_instability_norms(results):
+    if slow := format_note_on_low_instability_norms(results):
         warnings.warn(slow, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return results
 
@@ -301,7 +304,7 @@ def make_run_function_with_progress(
     def run() -> xr.Dataset:
         """Compile the equations if necessary, and run the study."""
         if study.accuracy.engine == Engine.COMPILED:
-            compile_equations_with_notice(
+            compile_equations_and_print_time(
                 ready.plan.example_scenes, study.measure.needs_time, show_progress_bar is True
             )
         with show_progress(study.name, show_progress_bar, **appearance) as show:
@@ -310,7 +313,7 @@ def make_run_function_with_progress(
     return run
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def open(name: str | Path, output: str | Path = Defaults.OUTPUT_DIRECTORY) -> xr.Dataset:
     """Load the results of a study into memory.
 
@@ -394,7 +397,7 @@ def _open_dataset_if_name_or_path(dataset: xr.Dataset | str | Path) -> xr.Datase
 
 
 @accept_former_keyword_names
-@partial(error_boundary, applies_to_internal_calls=True)
+@partial(raise_only_rsfstudy_errors, applies_to_internal_calls=True)
 def plot(
     dataset: xr.Dataset | str | Path,
     variable: str | None = None,
@@ -470,7 +473,7 @@ def plot(
     )
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     """Compare the results of a study with the published values in its claims.
 
@@ -517,7 +520,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     return build_verdict_table(results, list(declared.claims), declared.overrides)
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def rerun(
     file: str | Path,
     *,
@@ -614,7 +617,7 @@ def rerun(
     return compare_results_of_same_study(theirs, ours)
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> ResultsComparison:
     """Compare two datasets of results.
 
@@ -668,7 +671,7 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
     )
 
 
-@partial(error_boundary, unchanged_exceptions=(Exception,))
+@partial(raise_only_rsfstudy_errors, unchanged_exceptions=(Exception,))
 def recompute_cell(
     file: xr.Dataset | str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
@@ -738,7 +741,7 @@ def recompute_cell(
     return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
 
 
-@partial(error_boundary, applies_to_internal_calls=True)
+@partial(raise_only_rsfstudy_errors, applies_to_internal_calls=True)
 def _find_cell_in_results_file(
     results_or_path: xr.Dataset | str | Path,
     cell_coordinates: Mapping[str, Any],

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names, warn_renamed
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.formatting import format_number_or_text, is_sequence_of_axis_values
 from rsfstudy.quantities import describe_invalid_variable_name, is_valid_variable_name
 from rsfstudy.slider import SceneFields
@@ -35,13 +35,13 @@ def get_fields_of_axis_point(axis_point: Any) -> Any:
     Returns
     -------
     object
-        Mapping of fields to values. An object without the attribute ``axis_fields`` is returned
-        unchanged.
+        Mapping of fields to values. An object without the attribute ``si_values_by_axis_name`` is
+        returned unchanged.
     """
-    if hasattr(axis_point, "axis_fields"):
-        return axis_point.axis_fields
+    if hasattr(axis_point, "si_values_by_axis_name"):
+        return axis_point.si_values_by_axis_name
     if hasattr(axis_point, "on_axis"):
-        warn_renamed("on_axis", "axis_fields", type(axis_point).__name__)
+        warn_renamed("on_axis", "si_values_by_axis_name", type(axis_point).__name__)
         return axis_point.on_axis
     return axis_point
 
@@ -108,7 +108,7 @@ def to_plain_value(field_name: str, value: Any) -> Any:
 
 @accept_former_keyword_names
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, init=False)
 class Axis:
     """Axis of a study, along which one or several fields vary.
@@ -152,9 +152,9 @@ class Axis:
     ['granite', 'gouge']
     """
 
-    get_fields_of_point = staticmethod(get_fields_of_axis_point)
-    check_storable_text = staticmethod(check_storable_text)
-    to_plain_value = staticmethod(to_plain_value)
+    point_fields_getter = staticmethod(get_fields_of_axis_point)
+    storable_text_checker = staticmethod(check_storable_text)
+    plain_value_converter = staticmethod(to_plain_value)
 
     dimension: str
     rows: tuple[AxisPointFieldValues, ...]
@@ -327,7 +327,7 @@ class Axis:
             if isinstance(column, str) and column in stated
         }
         known = kept | dict(units or {})
-        axis_samples.check_draws_have_units(table, columns_by_field, known)
+        axis_samples.check_fitted_draws_have_units(table, columns_by_field, known)
         return cls(dimension, made, known)
 
     def _check_field_values(self) -> None:

@@ -356,7 +356,7 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
     return found, units
 
 
-def check_draws_have_units(
+def check_fitted_draws_have_units(
     table: Any,
     columns_by_field: Mapping[str, QuantityNameOrFunction],
     units_by_field: Mapping[str, str],
@@ -385,7 +385,11 @@ def check_draws_have_units(
         if not isinstance(column_name, str) or name in units_by_field:
             continue
         units = _UNITS_BY_FITTED_PARAMETER.get(column_name)
-        if units and column_name in table and _contains_draws(table[column_name]):
+        if (
+            units
+            and column_name in table
+            and _contains_draws_of_fitted_parameters(table[column_name])
+        ):
             raise InvalidValue(
                 name,
                 float(np.ravel(table[column_name])[0]),
@@ -395,7 +399,7 @@ def check_draws_have_units(
             )
 
 
-def _contains_draws(column: Any) -> bool:
+def _contains_draws_of_fitted_parameters(column: Any) -> bool:
     """Return True if a column of a table contains draws of fitted parameters."""
     index_name = getattr(getattr(column, "index", None), "name", None)
     return _DRAW_DIMENSION in (*getattr(column, "dims", ()), index_name)

@@ -14,7 +14,6 @@ import click
 
 from rsfstudy.cli.command_group import CommandGroup
 from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
-from rsfstudy.error_boundary import format_exception
 from rsfstudy.errors import (
     IncompleteWarning,
     Interrupted,
@@ -24,6 +23,7 @@ from rsfstudy.errors import (
     escape_control_characters,
     shorten_text,
 )
+from rsfstudy.exception_conversion import format_exception
 
 EXIT_STATUS_WRONG_USAGE = 2
 #: Signals that interrupt a command in the same way as Ctrl-C.
@@ -143,7 +143,7 @@ def _print_warning(message: Warning | str) -> None:
 
 def _print_error(text: str) -> None:
     """Print an error message to the standard error."""
-    from rsfstudy.cli.console import stderr_console
+    from rsfstudy.cli.console_output import stderr_console
 
     stderr_console.print(text)
 

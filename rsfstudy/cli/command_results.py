@@ -44,7 +44,7 @@ AnyCommandResult = TypeVar("AnyCommandResult", bound=CommandResult)
 
 
 def print_result_as_text_or_json(
-    result: AnyCommandResult, print_as_text: Callable[[AnyCommandResult], None], as_json: bool
+    result: AnyCommandResult, text_printer: Callable[[AnyCommandResult], None], as_json: bool
 ) -> int:
     """Print a result as text or as JSON.
 
@@ -52,7 +52,7 @@ def print_result_as_text_or_json(
     ----------
     result : CommandResult
         Result of a command.
-    print_as_text : callable
+    text_printer : callable
         Function that prints the result as text.
     as_json : bool
         If True, print JSON instead of text.
@@ -68,7 +68,7 @@ def print_result_as_text_or_json(
         If the output cannot be written, for example because the disk is full.
     """
     if not as_json:
-        print_as_text(result)
+        text_printer(result)
         return result.exit_status
     import json
 

@@ -165,7 +165,7 @@ def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) 
         remedy = f"Pass the file that declares the figure: --study {named_in or 'FILE'}."
         raise InvalidValue("plot", name, "is not a figure of rsfstudy", remedy=remedy)
     study = load_study(str(study_file))
-    if study.name != results.attrs["id"] or study.figure_name != name:
+    if study.name != results.attrs["id"] or study.figure_name_in_declaration != name:
         rule = f"does not draw {name!r} of {results.attrs['id']!r}"
         raise InvalidValue("study", str(study_file), rule)
     return None if isinstance(study.plot, str) else study.plot

@@ -19,8 +19,8 @@ import click
 
 from rsfstudy.cli.rig_options import EXAMPLE_VALUES_OF_RIG_OPTIONS, describe_rig_option
 from rsfstudy.defaults import Defaults
-from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import check_regular_file
 from rsfstudy.motion import Engine
 from rsfstudy.path_checks import check_path_is_valid
 

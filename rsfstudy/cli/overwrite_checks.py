@@ -7,12 +7,12 @@ from pathlib import Path
 
 import xarray as xr
 
-from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import check_regular_file
 
 
 def check_output_may_be_replaced(
-    output_path: Path, is_of_same_kind: Callable[[xr.Dataset], bool], kind_of_contents: str
+    output_path: Path, same_kind_predicate: Callable[[xr.Dataset], bool], kind_of_contents: str
 ) -> None:
     """Check that a command does not overwrite a different kind of data.
 
@@ -20,7 +20,7 @@ def check_output_may_be_replaced(
     ----------
     output_path : Path
         File that the command will write. The file need not exist.
-    is_of_same_kind : callable
+    same_kind_predicate : callable
         Function that takes the dataset in the existing file and returns True if the command may
         replace the dataset.
     kind_of_contents : str
@@ -36,7 +36,7 @@ def check_output_may_be_replaced(
         return
     try:
         with xr.open_dataset(output_path, engine="netcdf4") as there:
-            if is_of_same_kind(there):
+            if same_kind_predicate(there):
                 return
     except (OSError, RuntimeError, ValueError):
         pass  # the file has no dataset

@@ -25,7 +25,7 @@ def print_line(text: str, style: str = "", soft_wrap: bool = False) -> None:
         If True, long lines are not wrapped. Pass True for lines that contain a path or a command,
         so that users can copy the path or the command.
     """
-    from rsfstudy.cli.console import stdout_console
+    from rsfstudy.cli.console_output import stdout_console
 
     stdout_console.print(text, style=style or None, soft_wrap=soft_wrap)
 
@@ -38,7 +38,7 @@ def print_on_stderr(text: str) -> None:
     text : str
         Text to print.
     """
-    from rsfstudy.cli.console import stderr_console
+    from rsfstudy.cli.console_output import stderr_console
 
     stderr_console.print(text)
 

@@ -14,7 +14,7 @@ from rich.cells import cell_len
 from rich.padding import Padding
 from rich.text import Text
 
-from rsfstudy.cli.console import make_text_printable, stdout_console
+from rsfstudy.cli.console_output import make_text_printable, stdout_console
 from rsfstudy.reporting import SummaryTableOrSentence, TextTable
 
 #: Number of characters between two columns, and minimum width of a column that contains prose.

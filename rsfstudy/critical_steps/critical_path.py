@@ -64,7 +64,7 @@ class CriticalPath(NamedTuple):
     ----------
     log_slip_rate_at_instability_norm : float
         Value of ln(V/V_*) at the instability norm.
-    min_frictional_stress : float
+    frictional_stress_lower_bound : float
         Frictional stress at which the normal stress vanishes, in units of sigma_*.
     radiated_stress_at_instability_norm : float
         Stress that seismic waves radiate at the instability norm, in units of sigma_*.
@@ -85,7 +85,7 @@ class CriticalPath(NamedTuple):
     """
 
     log_slip_rate_at_instability_norm: float
-    min_frictional_stress: float
+    frictional_stress_lower_bound: float
     radiated_stress_at_instability_norm: float
     spring_stress_and_states_after_step: FloatTuple
     scene_parameter_values: FloatTuple
@@ -112,10 +112,10 @@ class CriticalPath(NamedTuple):
             Path with the load point velocity of the scene.
         """
         slow, x = scene.equations_between_ruptures(with_time=False), scene.log_instability_rate
-        weakest = scene.parts.normal_stress.min_frictional_stress(scene)
+        weakest = scene.parts.normal_stress.compute_frictional_stress_lower_bound(scene)
         begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
         tangency, planar = (
-            _build_tangency_point_solver(scene.friction_functions),
+            _build_tangency_point_solver(scene.friction_law_functions),
             scene.state_count == 1,
         )
         return cls(
@@ -163,7 +163,7 @@ class CriticalPath(NamedTuple):
             return None
         g, psi = self.tangency_point_solver(
             self.log_slip_rate_at_instability_norm,
-            (1.0 - 1e-6) * self.min_frictional_stress,
+            (1.0 - 1e-6) * self.frictional_stress_lower_bound,
             self.scene_parameter_values,
         )
         return None if math.isnan(g) else (g + self.radiated_stress_at_instability_norm, psi)

@@ -77,7 +77,7 @@ def find_critical_step_size_by_critical_path(
     if boundary is None or not step_family.motions_after_smaller_steps_decay(boundary.step_size):
         return None
     # If all orbits are closed at the critical stiffness, a motion never returns to a higher peak.
-    if step_family.scene.parts.law.has_closed_orbits:
+    if step_family.scene.parts.law.has_closed_orbits_at_critical_stiffness:
         return boundary
     scene = step_family.build_scene_with_step(boundary.step_size)
     if scene.log_load_velocity == -math.inf:
@@ -162,6 +162,6 @@ def _find_critical_step_size_with_error(
 def _iterate_decreasing_local_tolerances(integrator: Integrator) -> Iterator[float]:
     """Yield local tolerances, each a tenth of the previous tolerance."""
     for _ in range(_MAX_LOCAL_TOLERANCES_TRIED_PER_PATH):
-        if integrator.local_tolerance > Integrator.MIN_LOCAL_TOLERANCE:
+        if integrator.local_tolerance > Integrator.MIN_LOCAL_ERROR_TOLERANCE:
             yield integrator.local_tolerance
         integrator = integrator.refined()

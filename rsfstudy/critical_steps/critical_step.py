@@ -40,8 +40,8 @@ from rsfstudy.critical_steps.loading_step_types import (
     NormalStressStepFamily,
 )
 from rsfstudy.critical_steps.slow_manifold_accuracy import is_slow_manifold_inaccurate
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Accuracy, Integrator, MotionStopped
 from rsfstudy.quantities import Output
@@ -59,18 +59,18 @@ STEP_DIRECTIONS = ("up", "down")
 SCENE_FIELD_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Largest relative tolerance for the step size at which a limit cycle touches the instability norm.
-_MAX_RTOL_OF_LIMIT_CYCLE_STEP_SIZE = 1e-8
+_MAX_RTOL_FOR_SEARCH_BY_LIMIT_CYCLE = 1e-8
 
 #: Maximum width of a bracket that confirms a critical step, relative to the step size.
 _MAX_BRACKET_WIDTH_OVER_STEP_SIZE = 0.02
 
 #: Excess over the instability norm above which the first peak of a motion exceeds the norm before
 #: the motion can approach a limit cycle.
-_MIN_FIRST_PEAK_ABOVE_INSTABILITY_NORM = 0.1
+_MIN_HEIGHT_OF_FIRST_PEAK_ABOVE_NORM = 0.1
 
 #: Instability norm (limit of the dimensionless slip rate) at which the effect of inertia is
 #: negligible.
-_MAX_INSTABILITY_NORM_WITHOUT_INERTIA = 1e-3
+_SLIP_RATE_NORM_OF_NEGLIGIBLE_INERTIA = 1e-3
 
 #: The measure ``LinearStability`` has an output of the same name, which includes inertia and
 #: radiation damping.
@@ -93,7 +93,7 @@ def _build_outputs_for_stepped_field(stepped_field_name: str) -> tuple[Output, .
     return Output(critical, error=True), *map(Output, beside), _QUASI_STATIC_CRITICAL_STIFFNESS
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class CriticalStep(Measure):
     r"""Smallest step after which the slip rate reaches the instability norm.
@@ -268,7 +268,7 @@ class CriticalStep(Measure):
             return self._search_with_increasing_step_size(steps, integrator)
         if not is_slow_manifold_inaccurate(scene, integrator):
             # A limit cycle attracts nearby paths weakly, so its boundary needs a smaller tolerance.
-            tight = integrator.tightened_to(_MAX_RTOL_OF_LIMIT_CYCLE_STEP_SIZE)
+            tight = integrator.tightened_to(_MAX_RTOL_FOR_SEARCH_BY_LIMIT_CYCLE)
             for find, own in (
                 (find_critical_step_size_by_critical_path, integrator),
                 (find_critical_step_size_by_limit_cycle, tight),
@@ -344,7 +344,7 @@ class CriticalStep(Measure):
             if (
                 step_size_estimate.limit_cycle_touches_instability_norm
                 and below is not None
-                and below > _MIN_FIRST_PEAK_ABOVE_INSTABILITY_NORM
+                and below > _MIN_HEIGHT_OF_FIRST_PEAK_ABOVE_NORM
             ):
                 break
             width *= 10.0
@@ -546,7 +546,7 @@ def _compute_massless_critical_step_size(
 
     The estimate requires few evaluations. The result is None if there is no critical path.
     """
-    norm = min(step_family.scene.instability_norm, _MAX_INSTABILITY_NORM_WITHOUT_INERTIA)
+    norm = min(step_family.scene.instability_norm, _SLIP_RATE_NORM_OF_NEGLIGIBLE_INERTIA)
     massless = type(step_family)(
         step_family.scene.without_mass().with_(instability_norm=norm), step_family.sign
     )

@@ -25,7 +25,7 @@ from rsfstudy.slider import Scene
 #: size to the largest step size.
 MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
 #: Increase of the largest step, in units of ln V, if inertia delays the rise of slip rate.
-LOG_INCREASE_OF_MAX_STEP_BY_INERTIA = 5.0
+LOG_RATE_ADDED_TO_MAX_STEP_FOR_INERTIA = 5.0
 #: The effect of inertia on the critical step size is neglected if the effect is less than this
 #: fraction of the requested accuracy.
 MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL = 0.01
@@ -42,7 +42,7 @@ _MAX_SECANT_ITERATIONS = 8
 #: change in the misfit.
 _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
 #: Number of successive step sizes without a critical path after which the search is abandoned.
-_MAX_STEP_SIZES_WITHOUT_CRITICAL_PATH = 3
+_MAX_SIZE_COUNT_WITHOUT_CRITICAL_PATH = 3
 
 
 class LoadingStepFamily:
@@ -453,7 +453,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
             ends = dict.fromkeys(ways, (guess, misfit_function(log_size(guess))))
             last = {1: _MAX_POSITION, -1: lowest}
             stride, failures = 0.2, 0
-            while failures < _MAX_STEP_SIZES_WITHOUT_CRITICAL_PATH and any(
+            while failures < _MAX_SIZE_COUNT_WITHOUT_CRITICAL_PATH and any(
                 ends[way][0] != last[way] for way in ways
             ):
                 for way, (at, value) in ends.items():

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.loading_step_families import (
-    LOG_INCREASE_OF_MAX_STEP_BY_INERTIA,
+    LOG_RATE_ADDED_TO_MAX_STEP_FOR_INERTIA,
     LOOSE_INTEGRATION_TOLERANCE,
     MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL,
     MIN_STEP_SIZE,
@@ -37,7 +37,7 @@ from rsfstudy.status import Status
 MIN_SEARCHED_LOAD_VELOCITY = 1e-20
 #: Minimum value of b/a - 1 in the formula for the first guess of the critical step size. The
 #: minimum of b/a - 1 is necessary because some laws weaken friction although b < a.
-_MIN_B_OVER_A_MINUS_ONE_IN_SIZE_GUESS = 1e-6
+_MIN_B_OVER_A_MINUS_ONE_FOR_STEP_GUESS = 1e-6
 #: Largest spring stress after a step, in units of sigma_*.
 _MAX_SPRING_STRESS_AFTER_STEP = 1e6
 _LOG_OF_MAX_FLOAT = math.log(sys.float_info.max)
@@ -88,7 +88,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
 
         The closed forms apply to the slip law.
         """
-        weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_B_OVER_A_MINUS_ONE_IN_SIZE_GUESS)
+        weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_B_OVER_A_MINUS_ONE_FOR_STEP_GUESS)
         return float(np.logaddexp(0.0, self.scene.stiffness_ratio - 1.0 - math.log(weakening)))
 
     def _find_misfit_sign_from_motion(self, scene: Scene, integrator: Integrator) -> float:
@@ -165,7 +165,12 @@ class DisplacementStepFamily(LoadingStepFamily):
         if not scene.has_mass:
             return False
         behind, rate = compute_slip_lag_due_to_inertia(self.build_scene_with_step(step_size))
-        missed = 0.5 * scene.a * scene.parts.law.state_change_per_log_rate_over_a / scene.stiffness
+        missed = (
+            0.5
+            * scene.a
+            * scene.parts.law.steady_state_change_per_log_rate_over_a
+            / scene.stiffness
+        )
         loaded = scene.load_velocity / rate if rate else 0.0
         return (
             behind * (loaded + missed)
@@ -231,10 +236,10 @@ class DisplacementStepFamily(LoadingStepFamily):
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
             return 0.0
         if self.sign < 0:
-            weakest = scene.parts.normal_stress.min_frictional_stress(scene)
+            weakest = scene.parts.normal_stress.compute_frictional_stress_lower_bound(scene)
             return min(scene.mu_star, -weakest) / scene.stiffness
-        farther = LOG_INCREASE_OF_MAX_STEP_BY_INERTIA if scene.has_mass else 0.0
-        friction = scene.frictional_stress_after_jump(
+        farther = LOG_RATE_ADDED_TO_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
+        friction = scene.frictional_stress_from_strength(
             scene.a * (scene.log_instability_rate + farther)
         )
         if friction is None:
@@ -294,7 +299,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
             if scene.has_mass
             else 0.0
         )
-        missed = max(1.0, 0.5 * scene.parts.law.state_change_per_log_rate_over_a) * behind
+        missed = max(1.0, 0.5 * scene.parts.law.steady_state_change_per_log_rate_over_a) * behind
         return (
             missed
             > MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL
@@ -372,7 +377,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
             return 0.0
         level = scene.log_instability_rate + (
-            LOG_INCREASE_OF_MAX_STEP_BY_INERTIA if scene.has_mass else 0.0
+            LOG_RATE_ADDED_TO_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
         )
 
         def excess(size: float) -> float:
@@ -422,7 +427,9 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         """Return ln(V/V_*) immediately after the step, without inertia."""
         scene = self.build_scene_with_step(step_size).without_mass()
         steady_states = scene.compute_steady_states(0.0, 0.0)
-        return scene.slow_manifold_point(scene.spring_stress_step, steady_states).log_slip_rate
+        return scene.compute_slow_manifold_point(
+            scene.spring_stress_step, steady_states
+        ).log_slip_rate
 
 
 def _motion_reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
+from rsfstudy.critical_steps.monotone_slip_rate_rise_check import (
     build_events_testing_monotone_rise,
     is_slip_rate_rise_monotone,
 )
@@ -46,7 +46,7 @@ _LEAP_FACTOR, _MIN_LEAP_FACTOR = 1.3, 1.002
 _REQUIRED_EQUAL_PEAKS_IN_A_ROW = 4
 #: Assumed height of the ln V peak above the instability norm, if the motion is integrated only up
 #: to the norm.
-_ASSUMED_PEAK_ABOVE_INSTABILITY_NORM = 1.0
+_ASSUMED_PEAK_HEIGHT_ABOVE_NORM = 1.0
 #: A motion has settled if its distance from steady sliding is less than this fraction of the
 #: largest distance from steady sliding during the motion.
 _SETTLED_DISTANCE_OVER_MAX_DISTANCE = 1e-3
@@ -165,7 +165,7 @@ def _compute_max_log_rate_of_closed_orbit(scene: Scene, integrator: Integrator) 
     integrated backwards in time to the previous peak. The rest of the orbit may reach slip rates of
     1e-40 V_*, at which an integration would lose all digits.
     """
-    begin = Integrator.initial_point(scene)
+    begin = Integrator.compute_initial_point(scene)
     equations, start = (
         scene.equations_without_mass(with_time=False),
         (begin.spring_stress, begin.psi),
@@ -177,7 +177,7 @@ def _compute_max_log_rate_of_closed_orbit(scene: Scene, integrator: Integrator) 
     specs = (_SLIP_RATE_PEAK_SPECIFICATION, minimum("log_slip_rate"), rise("log_slip_rate", norm))
     for event in integrator.follow_equations(equations, start, specs, backward=not rising):
         if event.kind is EventKind.RISE:
-            return norm + _ASSUMED_PEAK_ABOVE_INSTABILITY_NORM
+            return norm + _ASSUMED_PEAK_HEIGHT_ABOVE_NORM
         if (
             event.specification is not None
             or event.point.log_slip_rate >= norm
@@ -187,7 +187,7 @@ def _compute_max_log_rate_of_closed_orbit(scene: Scene, integrator: Integrator) 
     raise AssertionError("a motion without a time limit cannot end")
 
 
-def _orbit_touching_instability_norm_shrinks(scene: Scene, integrator: Integrator) -> bool:
+def _does_orbit_at_instability_norm_shrink(scene: Scene, integrator: Integrator) -> bool:
     """Return True if the orbit that touches the instability norm shrinks.
 
     Paths in a plane cannot cross, so no orbit inside a shrinking orbit reaches the norm.
@@ -211,7 +211,7 @@ def _slow_orbit_grows_to_instability_norm(
     norm. If the first peak of ln V on the next orbit is above the instability norm, the size of the
     next orbit is reduced.
     """
-    if not with_inertia and _orbit_touching_instability_norm_shrinks(scene, integrator):
+    if not with_inertia and _does_orbit_at_instability_norm_shrink(scene, integrator):
         return False
     leap = _LEAP_FACTOR
     while True:
@@ -223,7 +223,7 @@ def _slow_orbit_grows_to_instability_norm(
                 strict=True,
             )
         )
-        beyond = scene.slow_manifold_point(spring_stress, tuple(psis))
+        beyond = scene.compute_slow_manifold_point(spring_stress, tuple(psis))
         orbit = _follow_one_orbit(
             scene, steady_state, beyond, integrator, with_inertia=with_inertia
         )
@@ -282,7 +282,7 @@ def _follow_one_orbit(
                 )
         elif event.kind is EventKind.RISE:
             return _OrbitOutcome(
-                (*peaks, norm + _ASSUMED_PEAK_ABOVE_INSTABILITY_NORM), reached_instability_norm=True
+                (*peaks, norm + _ASSUMED_PEAK_HEIGHT_ABOVE_NORM), reached_instability_norm=True
             )
         elif event.kind is EventKind.SETTLED and steady_state.is_stable:
             return _OrbitOutcome(

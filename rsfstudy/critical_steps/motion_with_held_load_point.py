@@ -35,7 +35,7 @@ from rsfstudy.status import Status
 #: ln V and the instability norm.
 _MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING = 1.0, 0.12
 #: Decreases in ln V at which the weakening of friction by the states is tested.
-_LOG_RATE_DECREASES_TESTED_FOR_WEAKENING = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+_LOG_RATE_DECREASES_FOR_WEAKENING_TEST = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 #: Increases in ln V that are tested as upper bounds of the effect of pore pressure.
 _TRIAL_LOG_RATE_INCREASES_BY_PRESSURE = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
 #: Maximum ratio of the weakening of friction by the states to the decrease in spring stress. No
@@ -137,10 +137,10 @@ def _slip_rate_stays_below_instability_norm(scene: Scene, motion_point: MotionPo
     increased by this bound, the states weaken friction more slowly than the spring stress
     decreases.
     """
-    _value, slope, shift, shift_slope = scene.friction_relation(motion_point.psis)(
+    _value, slope, shift, shift_slope = scene.build_friction_relation(motion_point.psis)(
         motion_point.frictional_stress
     )
-    states, evolve = range(scene.parts.law.state_count), scene.state_evolution_function()
+    states, evolve = range(scene.parts.law.state_count), scene.build_state_evolution_function()
     strengthening = evolve(motion_point.log_slip_rate, motion_point.psis, shift)
     if min(strengthening[i] for i in states) < 0.0:
         return False
@@ -148,7 +148,7 @@ def _slip_rate_stays_below_instability_norm(scene: Scene, motion_point: MotionPo
     if motion_point.log_slip_rate + raised >= scene.log_instability_rate:
         return False
     fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_OVER_SPRING_UNLOADING)
-    for distance in _LOG_RATE_DECREASES_TESTED_FOR_WEAKENING:
+    for distance in _LOG_RATE_DECREASES_FOR_WEAKENING_TEST:
         x = motion_point.log_slip_rate - distance
         rest = scene.compute_steady_states(x, shift)
         later = scene.compute_steady_states(
@@ -170,25 +170,25 @@ def _compute_max_rate_rise_by_pore_pressure(
     tests trial increases in ln V. A trial increase is an upper bound if the highest pore pressure
     and temperature at the increased ln V reduce strength by less than a times the trial increase.
     """
-    value, _slope, shift, _ = scene.friction_relation(motion_point.psis)(
+    value, _slope, shift, _ = scene.build_friction_relation(motion_point.psis)(
         motion_point.frictional_stress
     )
     if not scene.parts.fluid.unknowns and not scene.parts.temperature.unknowns:
         return 0.0, shift
     for bound in _TRIAL_LOG_RATE_INCREASES_BY_PRESSURE:
-        hottest, coldest = _find_extreme_pressure_and_heat_states(
+        hottest, coldest = _find_pressure_and_temperature_bounds(
             scene, motion_point, motion_point.log_slip_rate + bound
         )
         if math.isinf(max(map(abs, (*hottest, *coldest)))):
             break
-        weaker = scene.friction_relation(hottest)(motion_point.frictional_stress)[0]
+        weaker = scene.build_friction_relation(hottest)(motion_point.frictional_stress)[0]
         if weaker - value < bound * scene.a:
-            shift = scene.friction_relation(coldest)(motion_point.frictional_stress)[2]
+            shift = scene.build_friction_relation(coldest)(motion_point.frictional_stress)[2]
             return bound, shift
     return math.inf, shift
 
 
-def _find_extreme_pressure_and_heat_states(
+def _find_pressure_and_temperature_bounds(
     scene: Scene, motion_point: MotionPoint, log_slip_rate: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the states at the highest pore pressure and the temperature limits.
@@ -205,7 +205,9 @@ def _find_extreme_pressure_and_heat_states(
         )
         range_of_rise = hottest[place] - coldest[place]
     if fluid.unknowns:
-        pressure = fluid.highest_pressure(log_slip_rate, motion_point.psis[-len(fluid.unknowns) :])
+        pressure = fluid.compute_pore_pressure_upper_bound(
+            log_slip_rate, motion_point.psis[-len(fluid.unknowns) :]
+        )
         # The pressure is the sum of the response to drainage and of the response to heating.
         heated = fluid.pressurisation_factor
         hottest[-1] = coldest[-1] = pressure + (heated * range_of_rise if heated else 0.0)

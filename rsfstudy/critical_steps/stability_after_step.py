@@ -103,7 +103,9 @@ def has_closed_orbits_at_critical_stiffness(scene: Scene) -> bool:
     """
     law = scene.parts.law
     return (
-        law.has_closed_orbits and not law.depends_on_stress and has_frictional_damping_only(scene)
+        law.has_closed_orbits_at_critical_stiffness
+        and not law.depends_on_stress
+        and has_frictional_damping_only(scene)
     )
 
 

@@ -12,7 +12,7 @@ from rsfstudy.critical_steps.loading_checks import (
 )
 from rsfstudy.critical_steps.motion_after_step import motion_reaches_instability_norm
 from rsfstudy.critical_steps.stability_after_step import is_neutrally_stable
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Integrator
 from rsfstudy.quantities import Output
@@ -20,7 +20,7 @@ from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Triggered(Measure):
     r"""Flag that is 1 if the step of a scene triggers an instability.

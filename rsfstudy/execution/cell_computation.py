@@ -280,7 +280,7 @@ def compute_packed_cell_batch(serialized_settings: bytes, packed_batch: bytes) -
         if ours
         else _cpu_time_limits.enforce_in_this_thread(cell_settings.cell_cpu_time_limit)
     ):
-        SceneFields.register_user_parts(cell_settings.user_parts)
+        SceneFields.user_parts_registrar(cell_settings.user_parts)
         Engine.register_user_steppers(cell_settings.user_stepper_classes)
         for key, *changes in pickle.loads(zlib.decompress(packed_batch)):
             cell = CellFieldChanges(*changes).build_cell(cell_settings.base_scene)

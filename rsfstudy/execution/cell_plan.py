@@ -56,7 +56,7 @@ def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
         Key of 16 bytes.
     """
     of_scene, of_measure = scene.stored_fields(), measure.plain_fields
-    for name in measure.omitted_fields:
+    for name in measure.fields_omitted_from_storage:
         del of_measure[name]
     values = (*of_scene.values(), *of_measure.values())
     floats = [value for value in values if type(value) is float]
@@ -117,7 +117,7 @@ class CellPlan:
         try:
             for scene, changes in study.cells():
                 self.keys[number] = compute_cell_key(scene, study.measure.with_(**changes))
-                example_scenes.setdefault(scene.field_index.part_classes, scene)
+                example_scenes.setdefault(scene.field_lookup.part_classes, scene)
                 if number in self._coordinates.cell_numbers:
                     self._scenes_for_coordinates[number] = scene
                 number += 1

@@ -70,7 +70,7 @@ class _BackgroundJob(NamedTuple):
     """Waiting computation, with the callbacks that receive its outcome."""
 
     progress_label: str
-    compute: Callable[[ReportProgressFunction], Any]
+    computation_function: Callable[[ReportProgressFunction], Any]
     on_result: Callable[[Any], None]
     on_error: Callable[[Exception], None]
     bokeh_document: Any
@@ -119,7 +119,7 @@ class BackgroundJobRunner:
 
     def start(
         self,
-        compute: Callable[[ReportProgressFunction], Any],
+        computation_function: Callable[[ReportProgressFunction], Any],
         on_result: Callable[[Any], None],
         on_error: Callable[[Exception], None],
         *,
@@ -129,7 +129,7 @@ class BackgroundJobRunner:
 
         Parameters
         ----------
-        compute : callable
+        computation_function : callable
             Function that takes a function ``report(fraction, text)`` and returns the result. The
             function may call ``report`` to move the progress bar.
         on_result : callable
@@ -139,7 +139,9 @@ class BackgroundJobRunner:
         progress_label : str, optional
             Text next to the progress bar.
         """
-        job = _BackgroundJob(progress_label, compute, on_result, on_error, pn.state.curdoc)
+        job = _BackgroundJob(
+            progress_label, computation_function, on_result, on_error, pn.state.curdoc
+        )
         pn.state.onload(partial(self._start_or_queue, job))
 
     def _start_or_queue(self, job: _BackgroundJob) -> None:
@@ -181,7 +183,7 @@ class BackgroundJobRunner:
         with collect_warnings_of_thread() as messages:
             try:
                 outcome = partial(
-                    job.on_result, job.compute(partial(self._update_progress_bar, job))
+                    job.on_result, job.computation_function(partial(self._update_progress_bar, job))
                 )
             except Exception as error:
                 outcome = partial(job.on_error, error)

@@ -25,7 +25,7 @@ from rsfstudy.storage import StoredDataset
 #: Variables that can be along x in the plot of a motion. The first available variable is used.
 _X_VARIABLES_OF_MOTION_PLOT = ("time", "load_point_displacement", "slip")
 #: Load of the motion if a measure solves for this load and has found no value.
-_STEP_SIZE_IF_NO_CRITICAL_STEP = {
+_FALLBACK_STEP_SIZE_BY_LOADING_FIELD = {
     "load_velocity_ratio": 2.0, "displacement_step": 1.0, "normal_stress_step": 0.1,
 }  # fmt: skip
 #: Load point velocity in V_* of the motion of a scene that has no step.
@@ -145,7 +145,7 @@ def _choose_loading_of_recomputed_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[dict[str, tuple[float, str]], str]:
     """Return the loading fields of a motion, their Python code, and an explanation."""
-    loads = [name for name in measure.solved_fields if name in _STEP_SIZE_IF_NO_CRITICAL_STEP]
+    loads = [name for name in measure.solved_fields if name in _FALLBACK_STEP_SIZE_BY_LOADING_FIELD]
     if loads:
         verified = f"{measure.primary_output}_unstable"
         value = float(outcome.values.get(verified, np.nan))
@@ -153,7 +153,7 @@ def _choose_loading_of_recomputed_motion(
             text = f'outcome.values["{verified}"]'
             note = "Motion after the step that the measure has verified as unstable."
         else:
-            value = _STEP_SIZE_IF_NO_CRITICAL_STEP[loads[0]]
+            value = _FALLBACK_STEP_SIZE_BY_LOADING_FIELD[loads[0]]
             text = repr(value)
             note = f"The measure found no critical step. Motion after {loads[0]} = {value:g}."
         loading = {loads[0]: (value, text)}

@@ -33,7 +33,7 @@ class CurveData:
     ----------
     label : str
         Point of the curve on the colour dimension. The string is empty for a single curve.
-    colour_point_index : int
+    index_on_colour_dimension : int
         Index of this point.
     x, y, y_error : ndarray
         Coordinates, values and error estimates. If the variable has no error estimate, ``y_error``
@@ -45,7 +45,7 @@ class CurveData:
     """
 
     label: str
-    colour_point_index: int
+    index_on_colour_dimension: int
     x: np.ndarray
     y: np.ndarray
     y_error: np.ndarray
@@ -120,7 +120,7 @@ def iterate_panel_selections(
         yield selection
         return
     for place in choose_evenly_spaced_indices(dataset.sizes[selection.facet], MAX_PANELS):
-        points = {**selection.points, selection.facet: int(place)}
+        points = {**selection.point_index_by_dimension, selection.facet: int(place)}
         yield PlotSelection(
             selection.variable, selection.kind, selection.x, selection.second, "", points
         )
@@ -146,19 +146,23 @@ def _extract_panel_arrays(
     lattice, error = dataset["status"], find_error_variable_name(dataset, panel.variable)
     status, cells = xr.DataArray(int(Status.OK)), xr.DataArray(-1)
     if has_one_value_per_cell(dataset, panel.variable):
-        status = lattice.isel({d: i for d, i in panel.points.items() if d in lattice.dims})
+        status = lattice.isel(
+            {d: i for d, i in panel.point_index_by_dimension.items() if d in lattice.dims}
+        )
         cells, stride = xr.DataArray(0), 1
         for name in map(str, reversed(lattice.dims)):
             place: Any = xr.DataArray(np.arange(lattice.sizes[name]), dims=name)
-            cells = cells + stride * (place if name in dimensions else panel.points[name])
+            cells = cells + stride * (
+                place if name in dimensions else panel.point_index_by_dimension[name]
+            )
             stride *= lattice.sizes[name]
     values = (
         dataset[panel.variable]
-        .isel(panel.points)
+        .isel(panel.point_index_by_dimension)
         .transpose(*dimensions)
         .drop_vars(dimensions, errors="ignore")
     )
-    errors = dataset[error].isel(panel.points) if error else xr.DataArray(np.nan)
+    errors = dataset[error].isel(panel.point_index_by_dimension) if error else xr.DataArray(np.nan)
     rest = [
         one.drop_vars(list(one.coords)).broadcast_like(values).transpose(*dimensions)
         for one in (errors, status, cells)
@@ -210,7 +214,7 @@ def _broadcast_x_values(
     values = dataset[panel.x] if panel.x in dataset.variables else dataset[x_dimension]
     if values.dtype.kind not in "iuf":
         return np.broadcast_to(np.arange(shape[-1], dtype=float), shape)
-    at = {d: i for d, i in panel.points.items() if d in values.dims}
+    at = {d: i for d, i in panel.point_index_by_dimension.items() if d in values.dims}
     dims = [d for d in (panel.second, x_dimension) if d in values.dims]
     return np.broadcast_to(values.isel(at).transpose(*dims).values.astype(float), shape)
 

@@ -10,12 +10,12 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from typing import Any
 
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import RunError
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.explorer.view_creation import create_view
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def explore(source: Any = None, state: str | None = None) -> Any:
     """Show a scene, a results dataset or a record with widgets in a notebook.
 
@@ -54,11 +54,11 @@ def explore(source: Any = None, state: str | None = None) -> Any:
 
 def serve(
     source: Any = None,
-    state: str | None = None,
+    widget_state_json: str | None = None,
     *,
     port: int | None = None,
     open_browser: bool = True,
-    announce_address: Callable[[str], None] = print,
+    address_callback: Callable[[str], None] = print,
 ) -> None:
     """Serve a view to the browser of this computer until the process is interrupted.
 
@@ -66,13 +66,13 @@ def serve(
     ----------
     source : Scene, Rig, Record, xarray.Dataset or path, optional
         Object to show, as for ``explore``.
-    state : str, optional
+    widget_state_json : str, optional
         Settings of the widgets.
     port : int, optional
         Port of the server. The default is 8067, or a free port if that port is in use.
     open_browser : bool, default: True
         If True, the page is opened in the browser.
-    announce_address : callable, default: print
+    address_callback : callable, default: print
         Function that receives the first address of the page.
 
     Raises
@@ -83,8 +83,10 @@ def serve(
         If the port is in use.
     """
     _check_panel_is_installed()
-    server = importlib.import_module("rsfstudy.explorer.server").ExplorerServer(source, state, port)
-    server.run(open_browser=open_browser, announce_address=announce_address)
+    server = importlib.import_module("rsfstudy.explorer.server").ExplorerServer(
+        source, widget_state_json, port
+    )
+    server.run(open_browser=open_browser, address_callback=address_callback)
 
 
 def _check_panel_is_installed() -> None:

@@ -7,8 +7,8 @@ from typing import Any
 
 import panel as pn
 
-from rsfstudy.error_boundary import format_exception
 from rsfstudy.errors import RsfStudyError
+from rsfstudy.exception_conversion import format_exception
 
 
 def create_error_page(error: Exception) -> Any:

@@ -102,6 +102,6 @@ def describe_loading_step(step_number: int, step: LoadingStep) -> str:
     """
     text = f"{step_number}: {step.start:.6g} s, "
     text += f"{step.velocity_before:.3g} to {step.velocity_after:.3g} µm/s"
-    if step.stress_ratio != 1.0:
+    if step.normal_stress_ratio != 1.0:
         text += f", {step.stress_before * 1e-6:.3g} to {step.stress_after * 1e-6:.3g} MPa"
     return text

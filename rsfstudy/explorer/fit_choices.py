@@ -172,7 +172,7 @@ class FitChoices:
         limits = self.build_window_limit_arguments()
         return read_record(record, **limits) if limits else record
 
-    def find_number_of_excluded_step(
+    def find_step_number_at_excluded_time(
         self, steps: Sequence[LoadingStep], excluded_time: float
     ) -> int | None:
         """Return the number of the step at a time that the user has excluded.
@@ -219,7 +219,7 @@ class FitChoices:
             {
                 n
                 for t in self.excluded
-                if (n := self.find_number_of_excluded_step(steps, t)) is not None
+                if (n := self.find_step_number_at_excluded_time(steps, t)) is not None
             }
         )
 

@@ -37,7 +37,7 @@ class SliderRange(NamedTuple):
 
     @classmethod
     def choose_for_field(
-        cls, default_value: float, typical_value: float, rule: str, scale_name: str
+        cls, default_value: float, typical_value: float, validation_rule: str, scale_name: str
     ) -> SliderRange:
         """Choose the range of a field from its declaration.
 
@@ -47,7 +47,7 @@ class SliderRange(NamedTuple):
             Default value, which is 0 if the field is optional.
         typical_value : float
             Positive value in the middle of the range.
-        rule : str
+        validation_rule : str
             Rule that the values satisfy, as the part declares it.
         scale_name : str
             Scale of the field, such as "D_c/V_*", or an empty string.
@@ -58,14 +58,16 @@ class SliderRange(NamedTuple):
             Range. The box accepts values outside the range.
         """
         high = _RATIO_OF_PLAIN_FIELD * typical_value
-        if "whole number" in rule:
+        if "whole number" in validation_rule:
             return cls(0.0, max(20.0, 2.0 * typical_value), has_only_whole_numbers=True)
-        if "between 0 and 1" in rule:
+        if "between 0 and 1" in validation_rule:
             return cls(0.0, 1.0)
-        if rule == POSITIVE or (rule == NON_NEGATIVE and scale_name in ("V_*", "D_c/V_*")):
+        if validation_rule == POSITIVE or (
+            validation_rule == NON_NEGATIVE and scale_name in ("V_*", "D_c/V_*")
+        ):
             ratio = _RATIO_OF_SCALED_FIELD if scale_name else _RATIO_OF_PLAIN_FIELD
             return cls(typical_value / ratio, typical_value * ratio, is_logarithmic=True)
-        return cls(0.0 if rule == NON_NEGATIVE or default_value else -high, high)
+        return cls(0.0 if validation_rule == NON_NEGATIVE or default_value else -high, high)
 
     def convert_position_to_value(self, position: float) -> float:
         """Return the value at a position between 0 and 1, with 4 significant digits."""

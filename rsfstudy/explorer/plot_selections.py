@@ -46,7 +46,7 @@ class PlotSelection:
         empty, there is a single curve.
     facet : str
         Dimension whose points have separate panels. If the string is empty, there is one panel.
-    points : mapping of str to int
+    point_index_by_dimension : mapping of str to int
         Index of the selected point on each remaining dimension of the results.
     """
 
@@ -55,7 +55,7 @@ class PlotSelection:
     x: str
     second: str
     facet: str
-    points: Mapping[str, int] = field(default_factory=dict)
+    point_index_by_dimension: Mapping[str, int] = field(default_factory=dict)
 
 
 def list_plottable_variables(dataset: xr.Dataset) -> list[str]:

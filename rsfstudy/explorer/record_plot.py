@@ -131,17 +131,17 @@ class RecordPlot:
         self._label_x_axis_of_lowest_figure()
         self._thin_visible_rows()
 
-    def shade_rows_outside_window(self, begin: float | None, end: float | None) -> None:
+    def shade_rows_outside_window(self, start_time: float | None, end_time: float | None) -> None:
         """Shade the rows outside the window.
 
         Parameters
         ----------
-        begin, end : float or None
+        start_time, end_time : float or None
             Limits of the window in s. None means the first or the last row.
         """
         before, after = self._outside
-        before.update(visible=begin is not None, right=self._convert_time_to_x(begin))
-        after.update(visible=end is not None, left=self._convert_time_to_x(end))
+        before.update(visible=start_time is not None, right=self._convert_time_to_x(start_time))
+        after.update(visible=end_time is not None, left=self._convert_time_to_x(end_time))
 
     def mark_steps_and_holds(
         self, steps: Sequence[LoadingStep], excluded_step_numbers: Sequence[int]
@@ -155,7 +155,7 @@ class RecordPlot:
         excluded_step_numbers : sequence of int
             Numbers of the steps that are not fitted, starting from 1.
         """
-        self._step_times = np.array([step.middle for step in steps])
+        self._step_times = np.array([step.middle_time for step in steps])
         numbers = range(1, len(steps) + 1)
         self._steps.data = {
             "x": [self._convert_time_to_x(time) for time in self._step_times],

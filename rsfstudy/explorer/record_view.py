@@ -219,10 +219,10 @@ class RecordView(ExplorerView):
         else:
             self._discard_outdated_fit()
 
-    def _select_fit_window(self, begin: float | None, end: float | None) -> None:
+    def _select_fit_window(self, start_time: float | None, end_time: float | None) -> None:
         """Select the rows between two times in s for the fit."""
         with self._ignore_widget_changes():
-            self._widgets["begin"].value, self._widgets["end"].value = begin, end
+            self._widgets["begin"].value, self._widgets["end"].value = start_time, end_time
         self._detect_and_show_steps_in_window()
 
     def _toggle_step_exclusion(self, step_index: int) -> None:
@@ -238,7 +238,7 @@ class RecordView(ExplorerView):
         kept = [
             time
             for time in self._excluded
-            if choices.find_number_of_excluded_step(steps, time) is None
+            if choices.find_step_number_at_excluded_time(steps, time) is None
         ]
         excluded = [
             float(f"{s.start:.9g}") for n, s in enumerate(steps, 1) if n not in self._steps.value

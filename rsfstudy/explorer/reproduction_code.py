@@ -40,7 +40,9 @@ def draw_figure_of_selection(dataset: xr.Dataset, selection: PlotSelection) -> F
         Figure.
     """
     if selection.kind == MAP:
-        part = dataset.isel(dict(selection.points)).transpose(..., selection.second, selection.x)
+        part = dataset.isel(dict(selection.point_index_by_dimension)).transpose(
+            ..., selection.second, selection.x
+        )
         return draw_figure(part, variable=selection.variable)
     panel = Panel(**_build_panel_arguments(dataset, selection))
     return draw_figure(dataset, DeclaredFigure([panel]))
@@ -51,7 +53,11 @@ def _build_panel_arguments(dataset: xr.Dataset, selection: PlotSelection) -> dic
     options: dict[str, Any] = {"x": selection.x, "y": selection.variable}
     options |= {"hue": [selection.second]} if selection.second else {}
     options |= {"facet": [selection.facet]} if selection.facet else {}
-    options |= {"isel": dict(selection.points)} if selection.points else {}
+    options |= (
+        {"isel": dict(selection.point_index_by_dimension)}
+        if selection.point_index_by_dimension
+        else {}
+    )
     error = find_error_variable_name(dataset, selection.variable)
     return options | ({"error_bars": error} if error else {}) | {"log": None}
 
@@ -93,7 +99,10 @@ def format_selection_as_python_code(
     if "sigma_star" in dataset.variables:
         shown = "shown"
         lines.append("shown = results.rsf.in_units()  # in MPa, um and s")
-    points, names = dict(selection.points), list_plotted_variable_names(dataset, selection)
+    points, names = (
+        dict(selection.point_index_by_dimension),
+        list_plotted_variable_names(dataset, selection),
+    )
     lines.append(f"part = {shown}[{names!r}]{f'.isel({points!r})' if points else ''}")
     lines += ["print(part.to_dataframe())", ""]
     if selection.kind == MAP:

@@ -154,7 +154,7 @@ class ResultPlot(ABC):
         panel : PlotSelection
             Selection that differs only in its points.
         """
-        title = describe_selected_points(dataset, panel.points)
+        title = describe_selected_points(dataset, panel.point_index_by_dimension)
         self.figure.title.text = convert_mathtext_to_unicode(title[:1].upper() + title[1:])
 
     def share_axis_limits_with(self, other_plot: ResultPlot) -> None:
@@ -276,11 +276,13 @@ def _choose_curve_styles(
 ) -> list[dict[str, Any]]:
     """Return the colour, dashes, opacity, marker and marker size of each curve."""
     with style_context():
-        cycled = [cycle_style(c.colour_point_index) for c in curves]
+        cycled = [cycle_style(c.index_on_colour_dimension) for c in curves]
     colours, dashes = [s["color"] for s in cycled], [s["linestyle"] for s in cycled]
     if mapper := build_colour_mapper_of_dimension(dataset, panel.second):
         points = dataset[panel.second].values.astype(float)
-        colours = [find_colour_of_value(mapper, points[c.colour_point_index]) for c in curves]
+        colours = [
+            find_colour_of_value(mapper, points[c.index_on_colour_dimension]) for c in curves
+        ]
         dashes = ["-"] * len(curves)
     is_recorded = panel.x in dataset.data_vars
     is_number = has_numeric_dtype(dataset[panel.x]) and not find_used_flag_names(
@@ -294,7 +296,9 @@ def _choose_curve_styles(
             if isinstance(dash, str)
             else list(dash[1]),
             "alpha": float(has_line),
-            "marker": _BOKEH_MARKER_BY_MATPLOTLIB_MARKER[cycle_marker(curve.colour_point_index)],
+            "marker": _BOKEH_MARKER_BY_MATPLOTLIB_MARKER[
+                cycle_marker(curve.index_on_colour_dimension)
+            ],
             "size": 6 if curve.x.size <= _MAX_POINTS_WITH_MARKERS or not has_line else 2,
         }
         for curve, colour, dash in zip(curves, colours, dashes, strict=True)

@@ -184,7 +184,11 @@ class ResultsView(ExplorerView):
 
     def _update_dimension_sliders(self) -> None:
         """Create a slider for each remaining dimension, and set its value."""
-        points = {d: i for d, i in self.selection.points.items() if self.shown.sizes[d] > 1}
+        points = {
+            d: i
+            for d, i in self.selection.point_index_by_dimension.items()
+            if self.shown.sizes[d] > 1
+        }
         if list(points) != list(self._sliders):
             self._sliders = {d: _create_dimension_slider(self.shown, d) for d in points}
             for name, slider in self._sliders.items():
@@ -209,16 +213,20 @@ class ResultsView(ExplorerView):
             wishes |= {"x": None, "second": None}
         with self.show_raised_errors():
             self._show_selection(
-                complete_plot_selection(self.shown, **wishes, points=self.selection.points)
+                complete_plot_selection(
+                    self.shown, **wishes, points=self.selection.point_index_by_dimension
+                )
             )
 
     def _handle_slider_change(self, dimension: str, event: Any) -> None:
         """Change the point of a dimension."""
-        if self._is_updating or event.new == self.selection.points.get(dimension):
+        if self._is_updating or event.new == self.selection.point_index_by_dimension.get(dimension):
             return
         with self.show_raised_errors():
             self._show_selection(
-                self._build_selection_with_points({**self.selection.points, dimension: event.new})
+                self._build_selection_with_points(
+                    {**self.selection.point_index_by_dimension, dimension: event.new}
+                )
             )
 
     def _build_selection_with_points(self, point_indices: Mapping[str, int]) -> PlotSelection:
@@ -339,7 +347,7 @@ class ResultsView(ExplorerView):
     def get_widget_state(self) -> dict[str, Any]:
         """Return the selection and the cell. See ``ExplorerView.get_widget_state``."""
         choices = {name: getattr(self.selection, name) for name in _SELECTION_FIELD_NAMES}
-        state = choices | {"points": dict(self.selection.points)}
+        state = choices | {"points": dict(self.selection.point_index_by_dimension)}
         return state | ({"cell": self._cell_number} if self._cell_number >= 0 else {})
 
     def set_widget_state(self, widget_state: Mapping[str, Any]) -> None:
@@ -389,7 +397,11 @@ class ResultsView(ExplorerView):
     def build_table_for_download(self) -> pd.DataFrame:
         """Return the numbers of the plot. See ``ExplorerView.build_table_for_download``."""
         part = self.build_dataset_for_download()
-        kept = {*map(str, part.data_vars), *map(str, part.dims), *self.selection.points}
+        kept = {
+            *map(str, part.data_vars),
+            *map(str, part.dims),
+            *self.selection.point_index_by_dimension,
+        }
         kept |= {self.selection.x}
         table = part.drop_vars([n for n in part.coords if n not in kept]).to_dataframe()
         table = table.reset_index()
@@ -403,7 +415,7 @@ class ResultsView(ExplorerView):
         See ``ExplorerView.build_dataset_for_download``.
         """
         names = list_plotted_variable_names(self.shown, self.selection)
-        return self.shown[names].isel(dict(self.selection.points))
+        return self.shown[names].isel(dict(self.selection.point_index_by_dimension))
 
 
 def _create_text_pane(text: str, font_weight: str = "normal") -> pn.pane.HTML:

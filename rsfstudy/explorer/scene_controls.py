@@ -10,13 +10,13 @@ import panel as pn
 
 from rsfstudy.explorer.number_widgets import POSITIVE, NumberWidget, SliderRange
 from rsfstudy.explorer.scene_settings import (
-    DISPLAY_UNITS_BY_SCALE,
+    DISPLAY_UNIT_BY_SCALE_SYMBOL,
     PROTOCOL_LOADING_NAME,
     QUANTITY_BY_SCENE_FIELD,
     README_RIG_QUANTITIES,
     SceneSettings,
-    convert_scale_to_display_units,
     find_dimensional_field_name,
+    get_rig_scale_in_display_units,
 )
 from rsfstudy.rig import Rig
 from rsfstudy.slider import SceneFields, SliderParameters
@@ -52,7 +52,7 @@ _TYPICAL_VALUE_BY_RIG_QUANTITY = README_RIG_QUANTITIES | {
     "shear_zone_width": "0.1 mm", "reference_temperature": "295 K",
     "pressurisation_factor": "0.3 MPa/K",
 }  # fmt: skip
-_EXAMPLE_PROTOCOL_CSV_BY_HAS_RIG = {
+_EXAMPLE_PROTOCOL_CSV_BY_RIG_PRESENCE = {
     True: "velocity (um/s), duration (s)\n10, 60\n0, 600\n10, 60\n",
     False: "velocity (V_*), duration (D_c/V_*)\n10, 6\n0, 60\n10, 6\n",
 }
@@ -166,7 +166,7 @@ class SceneControls:
         protocol = self.settings.protocol
         if part_slot.name == "loading":
             protocol = (
-                _EXAMPLE_PROTOCOL_CSV_BY_HAS_RIG[bool(rig)]
+                _EXAMPLE_PROTOCOL_CSV_BY_RIG_PRESENCE[bool(rig)]
                 if part_name == PROTOCOL_LOADING_NAME
                 else ""
             )
@@ -177,13 +177,15 @@ class SceneControls:
         """Return a typical value of a field, with units if there is a rig."""
         if field_name == "inertia":
             return True
-        value = _TYPICAL_VALUE_BY_FIELD.get(field_name, SceneFields.collect_defaults()[field_name])
+        value = _TYPICAL_VALUE_BY_FIELD.get(
+            field_name, SceneFields.map_field_names_to_defaults()[field_name]
+        )
         scale = QUANTITY_BY_SCENE_FIELD[field_name].scale
         if self._rig is None or not scale:
             return value
         return (
-            f"{value * convert_scale_to_display_units(self._rig, scale):.4g} "
-            f"{DISPLAY_UNITS_BY_SCALE[scale]}"
+            f"{value * get_rig_scale_in_display_units(self._rig, scale):.4g} "
+            f"{DISPLAY_UNIT_BY_SCALE_SYMBOL[scale]}"
         )
 
     def _convert_settings_to_units(self, units: str) -> None:
@@ -258,11 +260,11 @@ class SceneControls:
             )
             return box
         scale = (
-            convert_scale_to_display_units(self._rig, about["scale"])
+            get_rig_scale_in_display_units(self._rig, about["scale"])
             if self._rig and about["scale"]
             else 1.0
         )
-        unit = DISPLAY_UNITS_BY_SCALE[about["scale"]] if self._rig and about["scale"] else ""
+        unit = DISPLAY_UNIT_BY_SCALE_SYMBOL[about["scale"]] if self._rig and about["scale"] else ""
         typical = (default or _TYPICAL_VALUE_BY_FIELD.get(field_name, 1.0)) * scale
         limits = SliderRange.choose_for_field(
             default or 0.0, typical, declared.metadata["rule"], about["scale"]

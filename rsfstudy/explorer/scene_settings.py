@@ -25,7 +25,7 @@ from rsfstudy.slider import Scene, SceneFields
 #: Name of the choice of loading whose segments are a table.
 PROTOCOL_LOADING_NAME = "protocol"
 #: Units of rigs on the page, by the scale of a scene field.
-DISPLAY_UNITS_BY_SCALE = {
+DISPLAY_UNIT_BY_SCALE_SYMBOL = {
     "sigma_*": "MPa", "D_c": "um", "V_*": "um/s", "D_c/V_*": "s", "sigma_*/D_c": "MPa/um",
     "V_*/D_c": "1/s",
 }  # fmt: skip
@@ -108,7 +108,7 @@ class SceneSettings:
         SceneSettings
             Settings with the values that differ from the default values.
         """
-        described, defaults = scene.describe(), SceneFields.collect_defaults()
+        described, defaults = scene.describe(), SceneFields.map_field_names_to_defaults()
         values = {
             name: value
             for name, value in described.items()
@@ -331,14 +331,15 @@ def format_value_in_rig_units(rig: Rig, field_name: str, value: Any) -> Any:
     quantity = QUANTITY_BY_SCENE_FIELD.get(field_name)
     if quantity is None or not quantity.scale or isinstance(value, bool | str):
         return value
-    unit = DISPLAY_UNITS_BY_SCALE[quantity.scale]
-    return f"{value * convert_scale_to_display_units(rig, quantity.scale):.12g} {unit}"
+    unit = DISPLAY_UNIT_BY_SCALE_SYMBOL[quantity.scale]
+    return f"{value * get_rig_scale_in_display_units(rig, quantity.scale):.12g} {unit}"
 
 
-def convert_scale_to_display_units(rig: Rig, scale_name: str) -> float:
+def get_rig_scale_in_display_units(rig: Rig, scale_name: str) -> float:
     """Return a rig scale in the units shown on the page."""
     return (
-        float(rig.scales[scale_name].factor) / _SI_VALUE_BY_UNIT[DISPLAY_UNITS_BY_SCALE[scale_name]]
+        float(rig.si_scale_by_dimensionless_unit[scale_name].factor)
+        / _SI_VALUE_BY_UNIT[DISPLAY_UNIT_BY_SCALE_SYMBOL[scale_name]]
     )
 
 

@@ -81,19 +81,19 @@ class ExplorerServer:
         )
         self.url = f"http://{HOST}:{self.port}/?{urlencode(query)}"
 
-    def run(self, *, open_browser: bool, announce_address: Callable[[str], None]) -> None:
+    def run(self, *, open_browser: bool, address_callback: Callable[[str], None]) -> None:
         """Serve the page until the process is interrupted.
 
         Parameters
         ----------
         open_browser : bool
             If True, the page is opened in the browser.
-        announce_address : callable
+        address_callback : callable
             Function that receives the first address when the server is ready.
         """
         redirect_warnings_to_browser_page()
         self._server.start()
-        announce_address(self.url)
+        address_callback(self.url)
         if open_browser:
             self._server.io_loop.call_later(0.1, webbrowser.open, self.url)
         try:

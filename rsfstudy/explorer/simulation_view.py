@@ -133,7 +133,7 @@ class ComputedMotion(NamedTuple):
             "fault": fault.values,
         }
 
-    def compute_steady_friction_line(self) -> dict[str, np.ndarray]:
+    def compute_steady_state_friction_curve(self) -> dict[str, np.ndarray]:
         """Return steady-state friction over the slip rate range of the motion.
 
         Returns
@@ -312,7 +312,7 @@ class SimulationView(ExplorerView):
         columns = computed_motion.build_plot_columns()
         self._motion_source.data = columns
         self._start_source.data = {name: columns[name][:1] for name in ("rate", "fault")}
-        self._steady_source.data = computed_motion.compute_steady_friction_line()
+        self._steady_source.data = computed_motion.compute_steady_state_friction_curve()
         self._verdict.object = f"**{escape_markdown(computed_motion.stability_summary)}**"
         self._peaks.object = escape_markdown(computed_motion.peak_values_text)
         self._events.objects = [

@@ -18,9 +18,13 @@ if TYPE_CHECKING:
     from rsfstudy.fitting.fit_measure import Fit
     from rsfstudy.fitting.fit_validity_checks import describe_whiteness
     from rsfstudy.fitting.fit_window import FitWindow
+    from rsfstudy.fitting.hold_measurements import MAX_HOLD_OVER_SLIDING_VELOCITY
     from rsfstudy.fitting.hold_table import build_hold_table
-    from rsfstudy.fitting.holds import MAX_HOLD_OVER_SLIDING_VELOCITY
-    from rsfstudy.fitting.joint_model import fitted_fields, split_window_number, strip_window_number
+    from rsfstudy.fitting.joint_window_model import (
+        fitted_fields,
+        split_window_number,
+        strip_window_number,
+    )
     from rsfstudy.fitting.local_regression import compute_weighted_mean
     from rsfstudy.fitting.record import RECORD_COLUMNS, Record
     from rsfstudy.fitting.stress_drop_detection import MIN_SAMPLES, Detection
@@ -49,8 +53,12 @@ else:
             ),
             "fitting.fit_measure": ("Fit",),
             "fitting.hold_table": ("build_hold_table",),
-            "fitting.holds": ("MAX_HOLD_OVER_SLIDING_VELOCITY",),
-            "fitting.joint_model": ("fitted_fields", "split_window_number", "strip_window_number"),
+            "fitting.hold_measurements": ("MAX_HOLD_OVER_SLIDING_VELOCITY",),
+            "fitting.joint_window_model": (
+                "fitted_fields",
+                "split_window_number",
+                "strip_window_number",
+            ),
             "fitting.fault_slip_check": ("displacement_is_slip",),
             "fitting.local_regression": ("compute_weighted_mean",),
             "fitting.record": ("RECORD_COLUMNS", "Record"),

@@ -10,7 +10,7 @@ _MAX_ROWS, _TRIAL_TIMES = 400, 40
 #: Two straight lines are fitted to the displacement, and to the displacement plus elastic
 #: shortening. If the second sum of squared residuals is less than this fraction of the first sum,
 #: the displacement is the slip of the fault.
-_MAX_RESIDUAL_SQUARES_RATIO_OF_SLIP = 0.1
+_MAX_RESIDUAL_SQUARES_RATIO_IF_SLIP = 0.1
 
 
 def displacement_is_slip(
@@ -57,7 +57,7 @@ def displacement_is_slip(
     alone = _compute_residual_squares_of_two_lines(time, displacement)
     return (
         _compute_residual_squares_of_two_lines(time, displacement + shortening)
-        < _MAX_RESIDUAL_SQUARES_RATIO_OF_SLIP * alone
+        < _MAX_RESIDUAL_SQUARES_RATIO_IF_SLIP * alone
     )
 
 

@@ -2,7 +2,7 @@
 
 A filter smooths the friction peak after a velocity step, and introduces a correlation into the
 noise. A running mean over m rows also causes notches in the noise spectrum. The function
-``detect_unspecified_filter`` compares linearised models with and without a filter. If the model
+``detect_undeclared_filter`` compares linearised models with and without a filter. If the model
 with a filter has a smaller AIC and noticeably different parameters, the friction was probably
 filtered.
 """
@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rsfstudy.fitting import noise as noises
+from rsfstudy.fitting import noise_models as noises
 from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
 from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 from rsfstudy.fitting.noise_correlation_from_averaging import (
@@ -45,7 +45,7 @@ _CORNER_FREQUENCIES_OVER_SAMPLING_RATE = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.02
 _MAX_ROWS_FOR_FILTER_TEST, _NOISE_ESTIMATION_PASSES = 20_000, 2
 
 
-def detect_unspecified_filter(
+def detect_undeclared_filter(
     fit_solution: FitSolution, time: np.ndarray, noise_model_name: str
 ) -> tuple[str, ...]:
     """Test whether friction was filtered before it was recorded.
@@ -60,7 +60,7 @@ def detect_unspecified_filter(
     time : ndarray, shape (rows,)
         Times in s.
     noise_model_name : str
-        Noise model (see ``rsfstudy.fitting.noise.fit_noise_model``).
+        Noise model (see ``rsfstudy.fitting.noise_models.fit_noise_model``).
 
     Returns
     -------
@@ -148,14 +148,17 @@ def _iterate_candidate_filters(
 
 
 def _apply_filter_to_columns(
-    filter_kind: str, filter_size: float, time: np.ndarray, sample_columns: np.ndarray
+    filter_kind: str,
+    averaging_time_or_frequency: float,
+    time: np.ndarray,
+    sample_columns: np.ndarray,
 ) -> np.ndarray:
     """Apply a filter to the columns of a window."""
     if not filter_kind:
         return sample_columns
     if filter_kind == "mean":
-        return apply_running_mean(time, sample_columns, filter_size)
-    one = Filter(filter_kind, filter_size)
+        return apply_running_mean(time, sample_columns, averaging_time_or_frequency)
+    one = Filter(filter_kind, averaging_time_or_frequency)
     at = one.compute_required_sample_times(time)
     return np.column_stack(
         [one.apply(time, np.interp(at, time, each)) for each in sample_columns.T]

@@ -47,7 +47,7 @@ class Filter:
     kind : {"mean", "trailing_mean", "first_order", "butterworth_2", "butterworth_4"}
         Kind of filter. The filter is a running mean centred at each row, a running mean that ends
         at each row, or a low-pass filter.
-    size : float
+    averaging_time_or_frequency : float
         Averaging time in s for a running mean, or corner frequency in Hz for a low-pass filter.
 
     Raises
@@ -68,15 +68,15 @@ class Filter:
     """
 
     kind: str
-    size: float
+    averaging_time_or_frequency: float
 
     def __post_init__(self) -> None:
         """Validate the kind and the size of the filter."""
         if self.kind not in FILTER_KINDS:
             raise InvalidValue("filter", self.kind, "is unknown", choices=FILTER_KINDS)
-        if not 0.0 < self.size < math.inf:
+        if not 0.0 < self.averaging_time_or_frequency < math.inf:
             rule = "must be a positive averaging time in s or a positive corner frequency in Hz"
-            raise InvalidValue("filter", self.size, rule)
+            raise InvalidValue("filter", self.averaging_time_or_frequency, rule)
 
     @classmethod
     def parse(cls, text: str) -> Filter | None:
@@ -149,7 +149,9 @@ class Filter:
             )
             return np.asarray(unfiltered_samples[places].mean(axis=1))
         rate = 1.0 / float(at[1] - at[0])
-        sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=rate, output="sos")
+        sections = butter(
+            LOW_PASS_ORDERS[self.kind], self.averaging_time_or_frequency, fs=rate, output="sos"
+        )
         # Friction is assumed to be constant before the first row.
         begin = sosfilt_zi(sections) * unfiltered_samples[0]
         return np.asarray(np.interp(time, at, sosfilt(sections, unfiltered_samples, zi=begin)[0]))
@@ -183,7 +185,9 @@ class Filter:
                 "must have an averaging time that is shorter than the duration of the record, "
                 f"which is {time[-1] - time[0]:g} s"
             )
-            raise InvalidValue("filter", f"{self.kind} {self.size:g} s", rule)
+            raise InvalidValue(
+                "filter", f"{self.kind} {self.averaging_time_or_frequency:g} s", rule
+            )
         return slice(first, last)
 
     def filter_recorded_values(self, time: np.ndarray, recorded_values: np.ndarray) -> np.ndarray:
@@ -209,20 +213,28 @@ class Filter:
             if the filter needs too many interpolation points.
         """
         if self.kind not in LOW_PASS_ORDERS:
-            centre = 0.0 if self.kind == MEAN else -0.5 * self.size
+            centre = 0.0 if self.kind == MEAN else -0.5 * self.averaging_time_or_frequency
             # The deviations from the mean have smaller rounding errors.
             level = recorded_values.mean()
             deviations = (recorded_values - level)[:, None]
-            return np.asarray(level + apply_running_mean(time, deviations, self.size, centre)[:, 0])
+            return np.asarray(
+                level
+                + apply_running_mean(time, deviations, self.averaging_time_or_frequency, centre)[
+                    :, 0
+                ]
+            )
         interval = float(np.median(np.diff(time)))
-        about = f"{self.kind} {self.size:g} Hz"
-        if not self.size * interval < 0.5:
+        about = f"{self.kind} {self.averaging_time_or_frequency:g} Hz"
+        if not self.averaging_time_or_frequency * interval < 0.5:
             rule = (
                 "has no effect, because the record only contains frequencies below "
                 f"{0.5 / interval:g} Hz"
             )
             raise InvalidValue("filter", about, rule, remedy="Lower the corner frequency.")
-        step = interval / max(math.ceil(_ROW_POINTS_PER_CORNER_PERIOD * self.size * interval), 1)
+        step = interval / max(
+            math.ceil(_ROW_POINTS_PER_CORNER_PERIOD * self.averaging_time_or_frequency * interval),
+            1,
+        )
         if not (time[-1] - time[0]) / step < _MAX_ROW_POINTS:
             rule = (
                 f"requires more than {_MAX_ROW_POINTS:,} points, because the sampling "
@@ -231,14 +243,23 @@ class Filter:
             raise InvalidValue("filter", about, rule, remedy="Use a running mean: 'mean 1 s'.")
         at = np.arange(time[0], time[-1] + step, step)
         samples = np.interp(at, time, recorded_values)
-        sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=1.0 / step, output="sos")
+        sections = butter(
+            LOW_PASS_ORDERS[self.kind],
+            self.averaging_time_or_frequency,
+            fs=1.0 / step,
+            output="sos",
+        )
         # The values are assumed to be constant before the first row.
         begin = sosfilt_zi(sections) * samples[0]
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def _compute_averaging_time_on_each_side(self) -> tuple[float, float]:
         """Return the durations in s of the averaging interval before and after a row."""
-        return (0.5 * self.size, 0.5 * self.size) if self.kind == MEAN else (self.size, 0.0)
+        return (
+            (0.5 * self.averaging_time_or_frequency, 0.5 * self.averaging_time_or_frequency)
+            if self.kind == MEAN
+            else (self.averaging_time_or_frequency, 0.0)
+        )
 
     def _compute_running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:
         """Return the time offsets of the points that a running mean averages.
@@ -246,20 +267,22 @@ class Filter:
         Each offset is given in s, relative to the time of the row. If the averaging time is at
         least four sampling intervals, the points are one sampling interval apart.
         """
-        count = max(round(self.size / float(np.median(np.diff(time)))), 1)
+        count = max(round(self.averaging_time_or_frequency / float(np.median(np.diff(time)))), 1)
         count *= (
             max(math.ceil(_MIN_POINTS_OF_RUNNING_MEAN / count), 1)
             if count < _MIN_POINTS_OF_RUNNING_MEAN // 2
             else 1
         )
         middle = 0.5 if self.kind == MEAN else 1.0
-        return np.asarray(self.size * ((np.arange(count) + 0.5) / count - middle))
+        return np.asarray(
+            self.averaging_time_or_frequency * ((np.arange(count) + 0.5) / count - middle)
+        )
 
     def _build_low_pass_time_grid(self, time: np.ndarray) -> np.ndarray:
         """Return the evenly spaced times for evaluating a low-pass filter."""
-        first = float(time[0]) - _FILTER_SETTLING_PERIODS / self.size
+        first = float(time[0]) - _FILTER_SETTLING_PERIODS / self.averaging_time_or_frequency
         finest = max(
-            1.0 / (_GRID_POINTS_PER_CORNER_PERIOD * self.size),
+            1.0 / (_GRID_POINTS_PER_CORNER_PERIOD * self.averaging_time_or_frequency),
             (time[-1] - first) / _MAX_FILTER_GRID_POINTS,
         )
         return np.arange(first, float(time[-1]) + 2.0 * finest, finest)

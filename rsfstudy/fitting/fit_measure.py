@@ -14,11 +14,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.fitting import posterior
 from rsfstudy.fitting.confidence_intervals import compute_confidence_interval
-from rsfstudy.fitting.filter_detection import detect_unspecified_filter
+from rsfstudy.fitting.filter_detection import detect_undeclared_filter
 from rsfstudy.fitting.filters import Filter
 from rsfstudy.fitting.fit_outputs import build_fit_outputs
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
@@ -33,18 +33,18 @@ from rsfstudy.fitting.fit_validity_checks import (
     is_friction_rounding_too_coarse,
 )
 from rsfstudy.fitting.fit_window import (
-    LOADING_KINDS,
+    LOADING_HISTORY_SOURCES,
     FitWindow,
     compute_stiffness_ratios_to_first_window,
     guess_initial_parameter_values,
 )
-from rsfstudy.fitting.joint_model import (
-    JointModel,
+from rsfstudy.fitting.joint_window_model import (
+    JointWindowModel,
     add_window_numbers_to_parameter_names,
     is_per_window_parameter,
     strip_window_number,
 )
-from rsfstudy.fitting.noise import (
+from rsfstudy.fitting.noise_models import (
     WHITE_NOISE_NAME,
     check_noise_model_name,
     compute_ljung_box_p_value,
@@ -76,10 +76,10 @@ _SCENE_FIELDS_SET_BY_FIT = (
 )
 #: The direct effect counts as being at its lower bound if the ratio of the direct effect to its
 #: lower bound is less than this value.
-_MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND = 1.001
+_DIRECT_EFFECT_BOUND_TOLERANCE_FACTOR = 1.001
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Fit(Measure):
     r"""Fit of friction parameters to a laboratory record by least squares.
@@ -227,7 +227,7 @@ class Fit(Measure):
         if len(set(names)) < len(names):
             raise InvalidValue("records", names, "must have different names")
         check_free_parameters(self.free)
-        for name, step in self._fitted_record_names_and_steps:
+        for name, step in self._record_names_and_step_numbers:
             if name not in names:
                 raise InvalidValue("record", name, "is unknown", choices=names)
             if step < 1:
@@ -238,8 +238,10 @@ class Fit(Measure):
         if not 0.0 < self.part <= 1.0:
             raise InvalidValue("part", self.part, "must be greater than 0 and at most 1")
         check_fields_positive(self, "slip_distance_guess", "slip_distance_2_guess")
-        if self.loading not in LOADING_KINDS:
-            raise InvalidValue("loading", self.loading, "is unknown", choices=LOADING_KINDS)
+        if self.loading not in LOADING_HISTORY_SOURCES:
+            raise InvalidValue(
+                "loading", self.loading, "is unknown", choices=LOADING_HISTORY_SOURCES
+            )
         if "step_time" in self.free and self.loading == "recorded":
             rule = "can only be used with loading='steps'"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
@@ -267,11 +269,11 @@ class Fit(Measure):
     def parameters(self) -> tuple[str, ...]:
         """Names of the free parameters, with window numbers in joint fits."""
         return add_window_numbers_to_parameter_names(
-            self.free, len(self._fitted_record_names_and_steps)
+            self.free, len(self._record_names_and_step_numbers)
         )
 
     @property
-    def _fitted_record_names_and_steps(self) -> tuple[tuple[str, int], ...]:
+    def _record_names_and_step_numbers(self) -> tuple[tuple[str, int], ...]:
         """Record names and step numbers of the steps to fit."""
         return self.together or ((self.record or self.records[0].name, self.step),)
 
@@ -283,14 +285,14 @@ class Fit(Measure):
         ends = self.before, self.after, self.part
         return tuple(
             FitWindow(by_name[name], n, *ends, others[name])
-            for name, n in self._fitted_record_names_and_steps
+            for name, n in self._record_names_and_step_numbers
         )
 
     @property
     def outputs(self) -> Sequence[Output]:
         """Outputs of the fit, including the parameters and their errors."""
         return build_fit_outputs(
-            self.parameters, self.posterior > 0, len(self._fitted_record_names_and_steps)
+            self.parameters, self.posterior > 0, len(self._record_names_and_step_numbers)
         )
 
     @property
@@ -415,7 +417,9 @@ class Fit(Measure):
         model, place = search.model, windows[0].window_summary_values
         part = model.window_models[0]
         apart = float(
-            np.median(np.diff(part.load_point_displacement[part.time >= windows[0].step.start]))
+            np.median(
+                np.diff(part.load_point_displacement[part.time >= windows[0].loading_step.start])
+            )
         )
         unidentified = find_unidentified_parameters(found, apart)
         rows = [
@@ -447,7 +451,7 @@ class Fit(Measure):
             is_least = (
                 "a" in found.free_parameters
                 and found.parameter_values["a"]
-                < _MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND * search.compute_parameter_bounds("a")[0]
+                < _DIRECT_EFFECT_BOUND_TOLERANCE_FACTOR * search.compute_parameter_bounds("a")[0]
             )
             text = describe_unidentified_parameters(
                 found, unidentified, apart, direct_effect_is_at_bound=is_least
@@ -499,28 +503,30 @@ class Fit(Measure):
         distances = self.slip_distance_guess, self.slip_distance_2_guess
         first: dict[str, float] = {}
         for number, (part, window) in enumerate(zip(parts, windows, strict=True), start=1):
-            guess = guess_initial_parameter_values(part, window.step, self.free, distances)
+            guess = guess_initial_parameter_values(part, window.loading_step, self.free, distances)
             first = guess | first
             if len(windows) > 1:
                 first |= {
                     f"{n}_{number}": v for n, v in guess.items() if is_per_window_parameter(n)
                 }
         one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
-        model = JointModel(
+        model = JointWindowModel(
             tuple(parts), compute_stiffness_ratios_to_first_window(windows) if one_machine else ()
         )
         stderr = 0.0 if "stiffness" in self.free else self.stiffness_relative_stderr
         search = FitProblem(model, first, self.parameters, self.noise, stderr)
         return search, search.solve()
 
-    def find_validity_problems(self, problem: FitProblem, solution: FitSolution) -> tuple[str, ...]:
+    def find_validity_problems(
+        self, fit_problem: FitProblem, fit_solution: FitSolution
+    ) -> tuple[str, ...]:
         """Return the reasons why the standard errors of a fit are not valid.
 
         Parameters
         ----------
-        problem : FitProblem
+        fit_problem : FitProblem
             Least-squares problem for the model of all windows.
-        solution : FitSolution
+        fit_solution : FitSolution
             Solution of the least-squares problem.
 
         Returns
@@ -528,22 +534,24 @@ class Fit(Measure):
         tuple of str
             Reasons why the standard errors are not valid. The tuple is empty if they are valid.
         """
-        reasons = find_reasons_for_invalid_stderrs(solution, problem.model.recorded_friction)
+        reasons = find_reasons_for_invalid_stderrs(
+            fit_solution, fit_problem.model.recorded_friction
+        )
         # With recorded loading, any filter would reduce the effect of load point noise, so the test
         # for a filter would be misleading.
         is_recorded = self.loading == "recorded"
-        is_exact = solution.noise_sd < MIN_FRICTION_NOISE_SD
+        is_exact = fit_solution.noise_sd < MIN_FRICTION_NOISE_SD
         if (
             self.filter
             or is_recorded
             or is_exact
             or self.noise == WHITE_NOISE_NAME
-            or is_friction_rounding_too_coarse(solution)
+            or is_friction_rounding_too_coarse(fit_solution)
         ):
             return reasons
         return (
-            *detect_unspecified_filter(
-                solution, problem.model.time_since_start_of_each_window, self.noise
+            *detect_undeclared_filter(
+                fit_solution, fit_problem.model.time_since_start_of_each_window, self.noise
             ),
             *reasons,
         )
@@ -559,7 +567,7 @@ class Fit(Measure):
         return replace(output_values, values=values)
 
     def _collect_output_values(
-        self, fit_solution: FitSolution, rows: np.ndarray, joint_model: JointModel
+        self, fit_solution: FitSolution, rows: np.ndarray, joint_model: JointWindowModel
     ) -> dict[str, OutputValue]:
         """Return all outputs of a fit except the confidence intervals."""
         values: dict[str, OutputValue] = {}

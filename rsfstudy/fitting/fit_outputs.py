@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from rsfstudy.fitting.joint_model import strip_window_number
+from rsfstudy.fitting.joint_window_model import strip_window_number
 from rsfstudy.fitting.record import RECORD_COLUMNS
 from rsfstudy.fitting.window_model import LAW_SPECIFIC_PARAMETERS, PARAMETERS
 from rsfstudy.quantities import Output

@@ -29,11 +29,11 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from rsfstudy.fitting import noise as noises
+from rsfstudy.fitting import noise_models as noises
 from rsfstudy.fitting.fit_solution import FitSolution as FitSolution
 from rsfstudy.fitting.fit_solution import compute_aic
-from rsfstudy.fitting.joint_model import JointModel
-from rsfstudy.fitting.noise import NoiseModel
+from rsfstudy.fitting.joint_window_model import JointWindowModel
+from rsfstudy.fitting.noise_models import NoiseModel
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
 from rsfstudy.fitting.window_model import (
     ACCURATE_DIFFERENCE_SCHEME,
@@ -117,7 +117,7 @@ class FitProblem:
     free_parameters : sequence of str
         Names of the free parameters.
     noise_model_name : str
-        Noise model (see ``rsfstudy.fitting.noise.fit_noise_model``).
+        Noise model (see ``rsfstudy.fitting.noise_models.fit_noise_model``).
     stiffness_relative_stderr : float, default: 0.0
         Relative standard error of a fixed stiffness.
 
@@ -133,7 +133,7 @@ class FitProblem:
 
     def __init__(
         self,
-        model: JointModel,
+        model: JointWindowModel,
         initial_values: ParameterValues,
         free_parameters: Sequence[str],
         noise_model_name: str,

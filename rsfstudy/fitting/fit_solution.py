@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsfstudy.fitting.noise import NoiseModel
+from rsfstudy.fitting.noise_models import NoiseModel
 from rsfstudy.fitting.window_model import compute_derivative_by_fit_coordinate
 
 

@@ -13,9 +13,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from rsfstudy.fitting.fit_solution import FitSolution
-from rsfstudy.fitting.joint_model import strip_window_number
-from rsfstudy.fitting.noise import compute_ljung_box_p_value
-from rsfstudy.fitting.whiteness_test import LAG_COUNT_BEYOND_NOISE_ORDER
+from rsfstudy.fitting.joint_window_model import strip_window_number
+from rsfstudy.fitting.noise_models import compute_ljung_box_p_value
+from rsfstudy.fitting.whiteness_test import LAG_COUNT_BEYOND_AR_ORDER
 from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
 from rsfstudy.formatting import format_count_with_noun
 
@@ -204,7 +204,7 @@ def _yield_warning_if_residuals_correlate(fit_solution: FitSolution) -> Iterator
 
 
 def describe_load_point_noise(
-    fit_solution: FitSolution, loading_kind: str, displacement_noise_sd: float
+    fit_solution: FitSolution, loading_history_source: str, displacement_noise_sd: float
 ) -> str:
     """Return a remark about the noise in the load point displacement.
 
@@ -212,7 +212,7 @@ def describe_load_point_noise(
     ----------
     fit_solution : FitSolution
         Result of the fit.
-    loading_kind : {"steps", "recorded"}
+    loading_history_source : {"steps", "recorded"}
         Loading of the model (see ``rsfstudy.fitting.Fit``).
     displacement_noise_sd : float
         Standard deviation of the load point noise in um.
@@ -222,7 +222,7 @@ def describe_load_point_noise(
     str
         Remark, or an empty string if the displacement noise has little effect on the parameters.
     """
-    if loading_kind == "steps":
+    if loading_history_source == "steps":
         by_loading = (
             fit_solution.fit_coordinate_covariance
             - fit_solution.fit_coordinate_covariance_from_stiffness
@@ -368,5 +368,5 @@ def describe_whiteness(p_value: float, noise_order: int, rows: int) -> str:
         if p_value < WHITENESS_TEST_SIGNIFICANCE_LEVEL
         else "show no autocorrelation"
     )
-    last = min(LAG_COUNT_BEYOND_NOISE_ORDER + noise_order, rows // 4)
+    last = min(LAG_COUNT_BEYOND_AR_ORDER + noise_order, rows // 4)
     return f"whitened residuals {verdict} up to lag {last} (p = {p_value:.2g})"

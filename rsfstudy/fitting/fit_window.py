@@ -25,7 +25,7 @@ from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.recorded_loading import (
     build_loading_history,
     build_stepwise_loading_history,
-    find_steps_between,
+    find_loading_steps_between,
 )
 from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
 from rsfstudy.fitting.window_model import WindowModel, scene_to_parameters
@@ -43,7 +43,7 @@ _MAX_LOADING_DELAY_OVER_TIME_BEFORE_STEP = 0.2
 #: extent is less than this value.
 _MIN_WINDOW_OVER_REQUESTED_WINDOW = 0.98
 #: Allowed values of the option ``loading``.
-LOADING_KINDS = ("steps", "recorded")
+LOADING_HISTORY_SOURCES = ("steps", "recorded")
 #: Settings for comparing the recorded normal stress with the normal stress of the model. The first
 #: value is the number of rows in a running median that reduces the noise. The second value is the
 #: quantile of the differences that is compared with a limit. The third value is the number of
@@ -68,14 +68,14 @@ class FitWindow:
         Record that contains the step.
     step_number : int
         Number of the step, starting from 1.
-    displacement_before : float, default: 0.0
+    displacement_before_step : float, default: 0.0
         Load point displacement in um to include before the step. If 0, the window begins halfway
         between the previous step and this step, or at the beginning of the record if there is no
         previous step.
-    displacement_after : float, default: 0.0
+    displacement_after_step : float, default: 0.0
         Load point displacement in um to include after the step. If 0, the window ends at the next
         step or at the end of the record.
-    fraction_of_displacement_after : float, default: 1.0
+    fraction_of_displacement_after_step : float, default: 1.0
         Fraction of the displacement after the step to include.
     other_fitted_step_numbers : collection of int, optional
         Numbers of the other steps in a joint fit that belong to the same record. If the next step
@@ -101,13 +101,13 @@ class FitWindow:
 
     record: Record
     step_number: int
-    displacement_before: float = 0.0
-    displacement_after: float = 0.0
-    fraction_of_displacement_after: float = 1.0
+    displacement_before_step: float = 0.0
+    displacement_after_step: float = 0.0
+    fraction_of_displacement_after_step: float = 1.0
     other_fitted_step_numbers: Collection[int] = ()
 
     @property
-    def step(self) -> LoadingStep:
+    def loading_step(self) -> LoadingStep:
         """Step of load point velocity or normal stress in the window.
 
         Raises
@@ -126,7 +126,8 @@ class FitWindow:
         """Indices of the record rows in the window."""
         time = self.record.time
         return np.flatnonzero(
-            (time >= self._compute_start_time(self.step)) & (time <= self._compute_end_time())
+            (time >= self._compute_start_time(self.loading_step))
+            & (time <= self._compute_end_time())
         )
 
     @property
@@ -138,7 +139,9 @@ class FitWindow:
         time, stress = self.record.time, self.record.columns.get("normal_stress")
         if stress is None:
             return math.nan
-        first, last = np.searchsorted(time, (self._compute_start_time(self.step), self.step.start))
+        first, last = np.searchsorted(
+            time, (self._compute_start_time(self.loading_step), self.loading_step.start)
+        )
         return float(stress[min(first, len(time) - 1) : max(first + 1, last)].mean())
 
     @property
@@ -148,8 +151,8 @@ class FitWindow:
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {
             "load_point_noise": math.sqrt(noise_variance(time, moved)),
-            "velocity_before": self.step.velocity_before,
-            "velocity_after": self.step.velocity_after,
+            "velocity_before": self.loading_step.velocity_before,
+            "velocity_after": self.loading_step.velocity_after,
             "window_begins": moved[0],
             "window_ends": moved[-1],
             "normal_stress_before": self.mean_normal_stress_before_step,
@@ -180,7 +183,7 @@ class FitWindow:
 
     def _compute_end_time(self) -> float:
         """Return the time in s at which the window ends."""
-        record, step = self.record, self.step
+        record, step = self.record, self.loading_step
         # The window of a hold includes the sliding after the hold.
         later = [
             s
@@ -202,11 +205,12 @@ class FitWindow:
             beyond = (moved > at + distance) & (record.time > step.start)
             return float(record.time[np.argmax(beyond)] if beyond.any() else last)
 
-        if self.displacement_after:
-            last = min(last, reached(self.displacement_after))
-        if self.fraction_of_displacement_after < 1.0:
+        if self.displacement_after_step:
+            last = min(last, reached(self.displacement_after_step))
+        if self.fraction_of_displacement_after_step < 1.0:
             last = reached(
-                self.fraction_of_displacement_after * (np.interp(last, record.time, moved) - at)
+                self.fraction_of_displacement_after_step
+                * (np.interp(last, record.time, moved) - at)
             )
         return float(last)
 
@@ -219,7 +223,7 @@ class FitWindow:
     @property
     def truncation_remarks(self) -> list[str]:
         """Remarks about requested rows that the window does not include."""
-        record, step, moved = self.record, self.step, self.record.columns["displacement"]
+        record, step, moved = self.record, self.loading_step, self.record.columns["displacement"]
         nominal, begins, at, ends = np.interp(
             [
                 self._compute_earliest_start_time(step),
@@ -239,17 +243,17 @@ class FitWindow:
                 f"the window begins {at - begins:.4g} um before the step instead of "
                 f"{at - nominal:.4g} um, because the earlier friction is not a straight line"
             )
-        elif at - begins < _MIN_WINDOW_OVER_REQUESTED_WINDOW * self.displacement_before:
+        elif at - begins < _MIN_WINDOW_OVER_REQUESTED_WINDOW * self.displacement_before_step:
             found.append(
-                f"before= is reduced from {self.displacement_before:.4g} to {at - begins:.4g} um, "
-                "because the previous step or the beginning of the record is less than twice "
-                "this distance away"
+                f"before= is reduced from {self.displacement_before_step:.4g} to "
+                f"{at - begins:.4g} um, because the previous step or the beginning of the record "
+                "is less than twice this distance away"
             )
         if (
-            self.fraction_of_displacement_after == 1.0
-            and ends - at < _MIN_WINDOW_OVER_REQUESTED_WINDOW * self.displacement_after
+            self.fraction_of_displacement_after_step == 1.0
+            and ends - at < _MIN_WINDOW_OVER_REQUESTED_WINDOW * self.displacement_after_step
         ):
-            cut = f"after= is reduced from {self.displacement_after:.4g} to {ends - at:.4g} um"
+            cut = f"after= is reduced from {self.displacement_after_step:.4g} to {ends - at:.4g} um"
             found.append(f"{cut} because of the {later}")
         return found
 
@@ -265,17 +269,19 @@ class FitWindow:
         begins = step.start - (_WINDOW_START_BEFORE_STEP_FRACTION if earlier else 1.0) * (
             step.start - first
         )
-        if self.displacement_before:
+        if self.displacement_before_step:
             moved = record.columns["displacement"]
             at = np.interp(step.start, record.time, moved)
-            begins = max(begins, record.time[np.argmax(moved >= at - self.displacement_before)])
+            begins = max(
+                begins, record.time[np.argmax(moved >= at - self.displacement_before_step)]
+            )
         return float(begins)
 
     def create_window_model(
         self,
         scene: Scene,
         free_parameters: Collection[str],
-        loading_kind: str,
+        loading_history_source: str,
         integrator: Integrator,
     ) -> WindowModel:
         """Create the model of the window.
@@ -288,7 +294,7 @@ class FitWindow:
             Scene with the friction law and the fixed parameters.
         free_parameters : collection of str
             Names of the free parameters.
-        loading_kind : {"steps", "recorded"}
+        loading_history_source : {"steps", "recorded"}
             Loading of the model (see ``rsfstudy.fitting.Fit``).
         integrator : Integrator
             Integrator with the requested accuracy.
@@ -305,7 +311,7 @@ class FitWindow:
             before the step is not positive, or if the recorded normal stress differs from the
             normal stress of the model.
         """
-        record, step, rows = self.record, self.step, self.record_row_indices
+        record, step, rows = self.record, self.loading_step, self.record_row_indices
         time = record.time[rows]
         friction = record.columns["friction"][rows]
         if (
@@ -327,14 +333,16 @@ class FitWindow:
             raise MotionStopped(Status.NOT_APPLICABLE, text)
         begins, ends = self._compute_start_time(step), self._compute_end_time()
         pieces = build_loading_history(
-            record, begins, ends, use_recorded_rows=loading_kind == "recorded"
+            record, begins, ends, use_recorded_rows=loading_history_source == "recorded"
         )
         if scene.parts.normal_stress.name == "constant":
             # If the normal stress of the scene is constant, variations of the recorded normal
             # stress are noise.
             pieces[:, 2:] = 1.0, 0.0
         moves = (
-            self._build_loadings_with_shifted_steps(begins, ends) if loading_kind == "steps" else []
+            self._build_loadings_with_shifted_steps(begins, ends)
+            if loading_history_source == "steps"
+            else []
         )
         if "step_time" in free_parameters:
             for each in (pieces, *moves):
@@ -343,7 +351,9 @@ class FitWindow:
             text = "the window begins in a hold, but a fit must begin with steady sliding"
             raise MotionStopped(Status.NOT_APPLICABLE, text)
         self._check_normal_stress_matches_loading(rows, pieces)
-        steady = build_stepwise_loading_history(begins, find_steps_between(record, begins, ends))
+        steady = build_stepwise_loading_history(
+            begins, find_loading_steps_between(record, begins, ends)
+        )
         moved = integrate_load_point_velocity(steady, time, step.start)
         return WindowModel(scene, time, moved, friction, pieces, integrator, moves)
 
@@ -351,7 +361,7 @@ class FitWindow:
         self, start_time: float, end_time: float
     ) -> list[np.ndarray]:
         """Return loading histories with shifted step times and velocities."""
-        steps = find_steps_between(self.record, start_time, end_time)
+        steps = find_loading_steps_between(self.record, start_time, end_time)
         others = [step for step in steps if not step.changes_velocity]
         moved = copy_steps_shifted_by_their_errors(
             self.record, [step for step in steps if step.changes_velocity]

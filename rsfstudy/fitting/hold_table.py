@@ -75,10 +75,11 @@ def build_hold_table(
     words = "standard error" if error_suffix == "stderr" else "error estimate"
     numbers = np.column_stack([exact_values, values])
     data: dict[str, Any] = {
-        q.name: ("hold", numbers[:, n], q.attributes) for n, q in enumerate(HOLD_QUANTITIES)
+        q.name: ("hold", numbers[:, n], q.variable_attributes)
+        for n, q in enumerate(HOLD_QUANTITIES)
     }
     for n, about in enumerate(HOLD_QUANTITIES[_COUNT_OF_QUANTITIES_WITHOUT_UNCERTAINTY:]):
-        named = {**about.attributes, "long_name": f"{words} of {about.long_name}"}
+        named = {**about.variable_attributes, "long_name": f"{words} of {about.long_name}"}
         data[f"{about.name}_{error_suffix}"] = "hold", errors[:, n], named
     rate, stderr, intercept = fit_healing_rate(exact_values[:, 1], values[:, 2], healing_covariance)
     for name, value, meaning in (

@@ -20,7 +20,7 @@ _MAX_FITTED_BLOCK_AVERAGES, _MIN_BLOCK_AVERAGES_BESIDE_BREAK, _MIN_ROWS_OF_LINEA
 #: Smallest decrease in the sum of squared residuals if two lines are fitted instead of one line.
 #: The decrease is divided by the residual variance and by ln n for n block averages. The residual
 #: variance is increased if the residuals are correlated.
-_MIN_SQUARES_REDUCTION_BY_SLOPE_BREAK = 15.0
+_MIN_RESIDUAL_REDUCTION_BY_SLOPE_BREAK = 15.0
 #: Earlier rows are discarded only if their friction deviates from the line through the later rows
 #: by more than these limits. The first limit is an absolute value, and the second limit is in
 #: standard deviations of the residuals. For comparison, a tenfold velocity step changes friction by
@@ -111,7 +111,7 @@ def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
     gain = float(sums.compute_line_residual_squares(0, count)) - float(both.min())
     departs = float(np.abs(moved[:place] - x1 - v1 * time[:place]).max())
     worth = (
-        _MIN_SQUARES_REDUCTION_BY_SLOPE_BREAK
+        _MIN_RESIDUAL_REDUCTION_BY_SLOPE_BREAK
         * math.log(count)
         * size**2
         * (1.0 + rho)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from rsfstudy.fitting import noise
+from rsfstudy.fitting import noise_models
 from rsfstudy.fitting.outliers import find_rounding_quantum
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.velocity_steps import LoadingStep
@@ -177,7 +177,9 @@ def _compute_covariance_root_from_noise(
     table = np.column_stack([time, jacobian_and_residual_columns])[: len(time) // every * every]
     time, *rest = table.reshape(-1, every, table.shape[1]).mean(axis=1).T
     jacobian, left = np.array(rest[:-1]).T, rest[-1]
-    told = noise.fit_noise_model(noise.AUTOREGRESSIVE_NOISE_NAME, time, left, jacobian)
+    told = noise_models.fit_noise_model(
+        noise_models.AUTOREGRESSIVE_NOISE_NAME, time, left, jacobian
+    )
     white = told.whiten_columns(np.eye(len(time)))
     size = np.linalg.norm(white @ left) / np.sqrt(len(time) - jacobian.shape[1])
     # The steps are ordinary least-squares estimates, so their covariance matrix is J^+ R J^+'

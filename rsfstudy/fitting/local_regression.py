@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import polynomial
 
-from rsfstudy.fitting.noise import (
+from rsfstudy.fitting.noise_models import (
     AUTOREGRESSIVE_NOISE_NAME,
     NoiseModel,
     estimate_noise_model_by_moments,
@@ -75,7 +75,7 @@ def fit_linear_model(
     """Fit a linear model by generalised least squares.
 
     The noise is an autoregressive process, whose coefficients are estimated by restricted maximum
-    likelihood (see ``rsfstudy.fitting.noise``). Outliers are excluded from the fit.
+    likelihood (see ``rsfstudy.fitting.noise_models``). Outliers are excluded from the fit.
 
     Parameters
     ----------

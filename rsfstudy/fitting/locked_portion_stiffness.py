@@ -38,7 +38,7 @@ from scipy.optimize import least_squares
 
 from rsfstudy.fitting.friction_trend import fit_friction_trend
 from rsfstudy.fitting.local_regression import compute_weighted_mean
-from rsfstudy.fitting.noise import (
+from rsfstudy.fitting.noise_models import (
     AUTOREGRESSIVE_NOISE_NAME,
     build_white_noise_model,
     fit_noise_model,
@@ -55,7 +55,7 @@ _MIN_SLOPE_OVER_LARGEST_SLOPE_BY_KIND = {RELOADING: 0.6, UNLOADING: 0.3, INITIAL
 _MIN_SLOPE_SIGMAS, _MIN_ROWS_OF_LOCKED_PORTION = 12.0, 10
 #: Slopes are computed in windows. In each window, friction changes by this fraction of the change
 #: in friction in the whole portion.
-_WINDOW_FRICTION_CHANGE_OVER_TOTAL = 0.15
+_SLOPE_WINDOW_FRICTION_CHANGE_FRACTION = 0.15
 #: Largest number of rows of a portion. The rows of longer portions are thinned.
 _MAX_ROWS_OF_LOCKED_PORTION = 3000
 #: Smallest increase in friction during the initial loading.
@@ -230,9 +230,13 @@ def find_locked_portions(
             continue
         if not step.velocity_after:
             continue
-        begins = _find_end_of_step(time, displacement, step, noise_sd) if number else step.end
+        begins = (
+            _find_end_time_of_loading_step(time, displacement, step, noise_sd)
+            if number
+            else step.end
+        )
         rows = (time >= begins) & (time < ends)
-        moved = step.velocity_after * (time[rows] - step.middle)
+        moved = step.velocity_after * (time[rows] - step.middle_time)
         portion = _remove_rows_after_slip_onset(
             LockedPortion(kind, time[rows], moved, friction[rows])
         )
@@ -240,30 +244,30 @@ def find_locked_portions(
             yield portion
 
 
-def _find_end_of_step(
-    time: np.ndarray, displacement: np.ndarray, step: LoadingStep, noise_sd: float
+def _find_end_time_of_loading_step(
+    time: np.ndarray, displacement: np.ndarray, loading_step: LoadingStep, noise_sd: float
 ) -> float:
     """Return the time in s after which the load point velocity is constant.
 
     If a record has few rows before an immediate step, the detected step lasts longer than the
     actual step.
     """
-    later = np.flatnonzero(time > step.end)[:_ROWS_AFTER_STEP]
-    inside = (time > step.start) & (time < step.end)
+    later = np.flatnonzero(time > loading_step.end)[:_ROWS_AFTER_STEP]
+    inside = (time > loading_step.start) & (time < loading_step.end)
     if len(later) < 2:
-        return step.end
-    late = time - step.middle
-    line = step.velocity_before * np.minimum(late, 0.0) + step.velocity_after * np.maximum(
+        return loading_step.end
+    late = time - loading_step.middle_time
+    line = loading_step.velocity_before * np.minimum(
         late, 0.0
-    )
+    ) + loading_step.velocity_after * np.maximum(late, 0.0)
     level = float(np.mean((displacement - line)[later]))
     off = np.abs((displacement - line)[inside] - level).max(initial=0.0)
     is_immediate = off <= _MAX_DEVIATION_OF_IMMEDIATE_STEP * noise_sd
     gap = float(np.median(np.diff(time[later])))
-    change = step.velocity_after - step.velocity_before
+    change = loading_step.velocity_after - loading_step.velocity_before
     # The time of the step has an uncertainty.
     guard = math.cbrt(noise_sd**2 * gap / change**2) if change else 0.0
-    return (step.middle if is_immediate else step.end) + guard
+    return (loading_step.middle_time if is_immediate else loading_step.end) + guard
 
 
 def _remove_rows_after_slip_onset(portion: LockedPortion) -> LockedPortion | None:
@@ -279,7 +283,7 @@ def _remove_rows_after_slip_onset(portion: LockedPortion) -> LockedPortion | Non
     y = -y if portion.kind == UNLOADING else y
     half = max(int(np.argmax(y >= 0.5 * y.max())), 1)
     width = max(
-        int(np.argmax(y >= _WINDOW_FRICTION_CHANGE_OVER_TOTAL * y.max())),
+        int(np.argmax(y >= _SLOPE_WINDOW_FRICTION_CHANGE_FRACTION * y.max())),
         _MIN_ROWS_OF_LOCKED_PORTION // 2,
     )
     if count < 2 * width:

@@ -242,7 +242,7 @@ def set_normal_stresses_of_steps(
                 else (level, level)
             )
             step = step._replace(stress_before=before, stress_after=after)
-        if step.start == step.end and step.stress_ratio != 1.0:
+        if step.start == step.end and step.normal_stress_ratio != 1.0:
             # A change in normal stress takes at least one sampling interval.
             row = int(np.clip(np.searchsorted(time, step.start, "right"), 1, len(time) - 1))
             step = step._replace(start=float(time[row - 1]), end=float(time[row]))

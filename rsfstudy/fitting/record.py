@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.holds import measure_holds
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
+from rsfstudy.fitting.hold_measurements import measure_holds
 from rsfstudy.fitting.locked_portion_stiffness import measure_stiffness
 from rsfstudy.fitting.normal_stress_steps import (
     find_normal_stress_steps,
@@ -49,7 +49,7 @@ _STEP_TABLE_COLUMNS = (
 
 @accept_former_keyword_names
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, eq=False)
 class Record:
     """Laboratory record of a friction experiment.
@@ -244,7 +244,10 @@ class Record:
         numbers = [step[: len(_STEP_TABLE_COLUMNS)] for step in self.loading_steps]
         rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_TABLE_COLUMNS))
         shown = _STEP_TABLE_COLUMNS if "normal_stress" in self.columns else _STEP_TABLE_COLUMNS[:4]
-        data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
+        data = {
+            about.name: ("step", rows[:, n], about.variable_attributes)
+            for n, about in enumerate(shown)
+        }
         number = {"long_name": "number of the step", "units": "1"}
         steps = {"step": ("step", np.arange(1, len(rows) + 1), number)}
         return copy_with_cf_encoding(

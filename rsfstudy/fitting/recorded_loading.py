@@ -52,7 +52,7 @@ def build_loading_history(
     InvalidValue
         If ``use_recorded_rows`` is True and the record has no rows between the two times.
     """
-    steps = find_steps_between(record, start_time, end_time)
+    steps = find_loading_steps_between(record, start_time, end_time)
     if use_recorded_rows:
         part, first = record.window(start_time, end_time), steps[0] if steps else None
         if first is None:
@@ -65,7 +65,9 @@ def build_loading_history(
     return build_stepwise_loading_history(start_time, steps)
 
 
-def find_steps_between(record: Record, start_time: float, end_time: float) -> list[LoadingStep]:
+def find_loading_steps_between(
+    record: Record, start_time: float, end_time: float
+) -> list[LoadingStep]:
     """Return the steps of a record between two times.
 
     Parameters
@@ -85,14 +87,16 @@ def find_steps_between(record: Record, start_time: float, end_time: float) -> li
     ]
 
 
-def build_stepwise_loading_history(start_time: float, steps: Sequence[LoadingStep]) -> np.ndarray:
+def build_stepwise_loading_history(
+    start_time: float, loading_steps: Sequence[LoadingStep]
+) -> np.ndarray:
     """Return a loading history with constant loading between steps.
 
     Parameters
     ----------
     start_time : float
         Start of the first segment in s.
-    steps : sequence of LoadingStep
+    loading_steps : sequence of LoadingStep
         Steps in order of time.
 
     Returns
@@ -100,9 +104,12 @@ def build_stepwise_loading_history(start_time: float, steps: Sequence[LoadingSte
     ndarray, shape (segments, 4)
         Segments in the same format as the result of ``build_loading_history``.
     """
-    pieces, level = [(start_time, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
-    for step in steps:
-        lasts, rises = step.end - step.start, level * (step.stress_ratio - 1.0)
+    pieces, level = (
+        [(start_time, loading_steps[0].velocity_before if loading_steps else 0.0, 1.0, 0.0)],
+        1.0,
+    )
+    for step in loading_steps:
+        lasts, rises = step.end - step.start, level * (step.normal_stress_ratio - 1.0)
         for part, speed in _list_velocities_during_step(step):
             at = step.start + part * lasts
             pieces.append((float(at), float(speed), level + part * rises, rises / lasts))

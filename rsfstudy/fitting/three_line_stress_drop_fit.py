@@ -108,7 +108,7 @@ class _ThreeLineFits(NamedTuple):
         Pairs of times at which the lines meet.
     line_coefficients : ndarray, shape (pairs, 4)
         Coefficients of the lines (see ``_fit_three_connected_lines``).
-    inverse_normal_matrix : ndarray, shape (pairs, 4, 4)
+    inverse_normal_equations_matrix : ndarray, shape (pairs, 4, 4)
         Inverse of the normal matrix.
     residual_sums_of_squares : ndarray, shape (pairs,)
         Sum of squared residuals.
@@ -116,7 +116,7 @@ class _ThreeLineFits(NamedTuple):
 
     corner_time_pairs: np.ndarray
     line_coefficients: np.ndarray
-    inverse_normal_matrix: np.ndarray
+    inverse_normal_equations_matrix: np.ndarray
     residual_sums_of_squares: np.ndarray
 
     @property
@@ -182,7 +182,7 @@ def fit_stress_drop(
     spread = float(
         np.abs(sizes[excess <= _SIZE_INTERVAL_EXCESS_SQUARES * variance] - sizes[best]).max()
     )
-    inverse = lines.inverse_normal_matrix[best]
+    inverse = lines.inverse_normal_equations_matrix[best]
     variances = np.array([inverse[0, 0], inverse[1, 1], inverse[:2, :2].trace()])
     variances[2] -= 2.0 * inverse[0, 1]
     of_before, of_after, of_drop = HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * np.sqrt(

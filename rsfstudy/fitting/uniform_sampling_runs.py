@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 #: Two sampling intervals belong to different classes if their ratio exceeds this value.
-_MAX_SAMPLING_INTERVAL_RATIO_IN_CLASS = 2.0
+_MAX_RATIO_IN_SAMPLING_INTERVAL_CLASS = 2.0
 #: Number of rows in the running mean of the sampling intervals, smallest number of rows of a class
 #: with a separate noise process, and smallest number of rows of a run.
 _RUNNING_MEAN_ROWS, _MIN_ROWS_PER_NOISE_PROCESS, _MIN_ROWS_PER_SAMPLING_RUN = 15, 100, 30
@@ -259,7 +259,7 @@ def _classify_sampling_intervals(time: np.ndarray) -> np.ndarray:
     gaps = np.diff(time)
     gaps[gaps <= 0.0] = np.median(gaps)
     smooth = np.log(uniform_filter1d(gaps, min(_RUNNING_MEAN_ROWS, len(gaps)), mode="nearest"))
-    kinds = np.rint((smooth - np.median(smooth)) / math.log(_MAX_SAMPLING_INTERVAL_RATIO_IN_CLASS))
+    kinds = np.rint((smooth - np.median(smooth)) / math.log(_MAX_RATIO_IN_SAMPLING_INTERVAL_CLASS))
     kinds = np.append(kinds[:1], kinds)
     lasts = np.diff([0, *(np.flatnonzero(np.diff(kinds)) + 1), len(kinds)])
     steady = np.repeat(lasts, lasts) >= _MIN_ROWS_PER_SAMPLING_RUN

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 
 #: Largest number of rows that are segmented. Longer records are first averaged over blocks of rows.
 _MAX_ROWS_FOR_STEP_DETECTION = 20_000
@@ -57,7 +57,7 @@ ResidualSquaresFunction = Callable[[np.ndarray | int, np.ndarray | int], np.ndar
 _InterceptAndSlope = tuple[float, float]
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 class LoadingStep(NamedTuple):
     """Step of load point velocity, of normal stress, or of both.
 
@@ -94,7 +94,7 @@ class LoadingStep(NamedTuple):
     velocity_profile: tuple[tuple[float, float], ...] = ()
 
     @property
-    def middle(self) -> float:
+    def middle_time(self) -> float:
         """Time in s of an immediate step that results in the same displacement.
 
         If a record has few rows before a step, the detected step may last longer than the actual
@@ -108,7 +108,7 @@ class LoadingStep(NamedTuple):
         return self.velocity_before != self.velocity_after
 
     @property
-    def stress_ratio(self) -> float:
+    def normal_stress_ratio(self) -> float:
         """Ratio of the normal stresses after and before the step.
 
         The property is 1 if the normal stress was not recorded.
@@ -141,7 +141,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     if len(t) < 2 * _MIN_SEGMENT_ROWS:
         return ()
     t0, x0 = t[0], x[0]
-    variance, louder = noise_variance(t, x), _compute_noise_of_steps_over_whole_record(t, x)
+    variance, louder = noise_variance(t, x), _compute_local_over_typical_noise(t, x)
     sums = CumulativeSumsForLineFits(t - t0, x - x0, 1.0 / louder**2)
     knots = sorted(
         split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
@@ -301,9 +301,7 @@ def _compute_deviations_from_neighbours(time: np.ndarray, displacement: np.ndarr
     return np.asarray(off)
 
 
-def _compute_noise_of_steps_over_whole_record(
-    time: np.ndarray, displacement: np.ndarray
-) -> np.ndarray:
+def _compute_local_over_typical_noise(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Estimate the local noise of the displacement, relative to the typical noise.
 
     Returns
@@ -468,7 +466,7 @@ def _refine_line_intersection_time(
     time: np.ndarray,
     displacement: np.ndarray,
     initial_time: float,
-    row_reach: int,
+    initial_uncertainty_in_rows: int,
     variance_of_noise: float,
 ) -> float:
     """Compute the intersection of two lines again, from all rows of the record.
@@ -477,7 +475,10 @@ def _refine_line_intersection_time(
     the segmentation.
     """
     middle = int(np.searchsorted(time, initial_time))
-    i, j = max(middle - 20 * row_reach, 0), min(middle + 20 * row_reach, len(time))
+    i, j = (
+        max(middle - 20 * initial_uncertainty_in_rows, 0),
+        min(middle + 20 * initial_uncertainty_in_rows, len(time)),
+    )
     t, x = time[i:j] - initial_time, displacement[i:j]
     sums = CumulativeSumsForLineFits(t, x - x[0], np.ones(j - i))
     places = np.arange(_MIN_SEGMENT_ROWS, j - i - _MIN_SEGMENT_ROWS)

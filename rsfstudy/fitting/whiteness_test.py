@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 #: The number of lags in the autocorrelation test is the sum of this value and the order of the
 #: noise model.
-LAG_COUNT_BEYOND_NOISE_ORDER = 20
+LAG_COUNT_BEYOND_AR_ORDER = 20
 
 
 def compute_ljung_box_p_value(whitened_residuals: np.ndarray, autoregressive_order: int) -> float:
@@ -41,7 +41,7 @@ def compute_ljung_box_p_value(whitened_residuals: np.ndarray, autoregressive_ord
     .. [1] Ljung and Box (1978), Biometrika 65, 297-303.
     """
     count, seen = len(whitened_residuals), whitened_residuals - whitened_residuals.mean()
-    lags = np.arange(1, min(LAG_COUNT_BEYOND_NOISE_ORDER + autoregressive_order, count // 4) + 1)
+    lags = np.arange(1, min(LAG_COUNT_BEYOND_AR_ORDER + autoregressive_order, count // 4) + 1)
     correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
     size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
     return float(chi2.sf(size, max(len(lags) - autoregressive_order, 1)))

@@ -22,8 +22,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.limit_cycles.limit_cycle import INITIAL_PERTURBATION_DISPLACEMENT
 from rsfstudy.limit_cycles.stick_slip_cycles import iterate_stick_slip_cycles
 from rsfstudy.measure_base import Measure, Outcome
@@ -63,14 +63,14 @@ def _iterate_moment_outputs() -> Iterator[Output]:
                 yield Output(f"{full}_{suffix}", math_symbol, "1", f"{kind} {about}", scale=size)
 
 
-class _Event(NamedTuple):
+class _SlipEvent(NamedTuple):
     """Event of a motion: time of its beginning in D_c/V_*, and static stress drop in sigma_*."""
 
     start_time: float
     static_stress_drop: float
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class EventStatistics(Measure):
     r"""Moments of recurrence intervals and stress drops of successive events.
@@ -216,14 +216,14 @@ class EventStatistics(Measure):
         }
         for number, (name, *_about) in enumerate(_EVENT_QUANTITIES_WITH_MOMENTS):
             found, few, fine, half = (
-                _compute_moments(_compute_interval_and_drop_samples(part)[number])
+                _compute_moments(_list_recurrence_intervals_and_drops(part)[number])
                 for part in (
                     events,
                     *(part[: checked + 1] for part in (events, refined, halved)),
                 )
             )
             stderrs = _compute_moment_standard_errors(
-                _compute_interval_and_drop_samples(events)[number]
+                _list_recurrence_intervals_and_drops(events)[number]
             )
             for i, (statistic, *_rest) in enumerate(_MOMENT_NAMES_SYMBOLS_AND_LABELS):
                 full, scale = f"{name}_{statistic}", found[i]
@@ -240,7 +240,7 @@ class EventStatistics(Measure):
 
     def _list_events_delimiting_cycles(
         self, scene: Scene, integrator: Integrator, cycle_count: int
-    ) -> list[_Event]:
+    ) -> list[_SlipEvent]:
         """Return the events that delimit the intervals, without the discarded events.
 
         The list is shorter than ``cycle_count + 1`` if the motion settles.
@@ -254,7 +254,7 @@ class EventStatistics(Measure):
 
     def _iterate_events_of_noisy_motion(
         self, scene: Scene, integrator: Integrator
-    ) -> Iterator[_Event]:
+    ) -> Iterator[_SlipEvent]:
         """Yield the events of a scene with noise, detected with two levels of slip rate."""
         arrest = scene.log_load_velocity
         asked = (
@@ -271,21 +271,23 @@ class EventStatistics(Measure):
             elif event.specification == asked[1] and math.isnan(begun):
                 begun = event.time
             elif event.specification == asked[2] and not math.isnan(begun):
-                yield _Event(begun, before - event.point.spring_stress)
+                yield _SlipEvent(begun, before - event.point.spring_stress)
                 begun = math.nan
 
 
-def _iterate_events_of_noiseless_motion(scene: Scene, integrator: Integrator) -> Iterator[_Event]:
+def _iterate_events_of_noiseless_motion(
+    scene: Scene, integrator: Integrator
+) -> Iterator[_SlipEvent]:
     """Yield the cycles of a scene without noise as events."""
     time = 0.0
     for cycle in iterate_stick_slip_cycles(scene, integrator, None):
         if cycle is None:
             return
         time += cycle.recurrence_interval
-        yield _Event(time, cycle.compute_primary_output_values()[1])
+        yield _SlipEvent(time, cycle.compute_primary_output_values()[1])
 
 
-def _compute_interval_and_drop_samples(events: list[_Event]) -> tuple[np.ndarray, np.ndarray]:
+def _list_recurrence_intervals_and_drops(events: list[_SlipEvent]) -> tuple[np.ndarray, np.ndarray]:
     """Return the recurrence intervals, and the stress drop that ends each interval."""
     intervals = [after.start_time - before.start_time for before, after in pairwise(events)]
     return np.array(intervals), np.array([event.static_stress_drop for event in events[1:]])

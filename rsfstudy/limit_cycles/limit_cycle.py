@@ -23,8 +23,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.limit_cycles.limit_cycle_search import (
     LimitCycleSearch,
     StickSlipSequence,
@@ -123,7 +123,7 @@ _LIMIT_CYCLE_OUTPUTS = (
 )
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class LimitCycle(RecordingMeasure):
     r"""Limit cycle of stick-slip under a constant load point velocity.
@@ -222,7 +222,7 @@ class LimitCycle(RecordingMeasure):
             # unstable.
             scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
         if scene.state_count > 1:
-            return self._find_multi_state_cycle(scene, integrator)
+            return self._find_cycle_of_multi_state_scene(scene, integrator)
         for own in dict.fromkeys((integrator.loosened_to(_CYCLE_SEARCH_RTOL), integrator)):
             approach = LimitCycleSearch(scene, own)
             try:
@@ -241,7 +241,7 @@ class LimitCycle(RecordingMeasure):
                     return outcome
         return outcome if found else build_outcome_of_settling_motion(scene)
 
-    def _find_multi_state_cycle(self, scene: Scene, integrator: Integrator) -> Outcome:
+    def _find_cycle_of_multi_state_scene(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the limit cycle of a scene with several states.
 
         The motion is integrated with a low accuracy until it approaches a periodic orbit. The orbit
@@ -299,7 +299,7 @@ class LimitCycle(RecordingMeasure):
         }
         cycle = one.cycles[0]
         carried = (
-            cycle.end_point.spring_stress - cycle.start_point.spring_stress
+            cycle.motion_point_at_end.spring_stress - cycle.motion_point_at_start.spring_stress
         ) / scene.stiffness
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values["slip_per_event"] -= carried if one.period_in_cycles > 1 else 0.0
@@ -311,7 +311,7 @@ class LimitCycle(RecordingMeasure):
         values["events_until_repeat"] = float(max_cycles)
         values["work_per_cycle"] = one.rhs_evaluation_count / one.period_in_cycles
         status, why = determine_status_from_output_errors(integrator, one, errors)
-        why = why or _build_several_events_period_message(one)
+        why = why or _describe_several_events_per_period(one)
         path = extract_recorded_rows_of_cycles(scene, again.cycles, again.recording)
         return Outcome(
             status,
@@ -320,7 +320,7 @@ class LimitCycle(RecordingMeasure):
         )
 
 
-def _build_several_events_period_message(orbit: PeriodicOrbit) -> str:
+def _describe_several_events_per_period(orbit: PeriodicOrbit) -> str:
     """Return a message if a motion repeats only after several events."""
     if orbit.period_in_cycles == 1:
         return ""
@@ -502,8 +502,13 @@ def _compute_healing_exponent(scene: Scene, cycle: StickSlipCycle) -> float:
 
     The result is NaN if the law has no state variable Theta = b ln(theta/theta_*).
     """
-    slowed = cycle.slowest_slip_point.log_slip_rate - cycle.slip_arrest_point.log_slip_rate
+    slowed = (
+        cycle.motion_point_at_slowest_slip.log_slip_rate
+        - cycle.motion_point_at_slip_arrest.log_slip_rate
+    )
     law = scene.parts.law
     if law.state_count > 1 or not law.has_logarithmic_state or not abs(slowed) > 1.0:
         return math.nan
-    return (cycle.slowest_slip_point.state - cycle.slip_arrest_point.state) / (scene.b * slowed)
+    return (cycle.motion_point_at_slowest_slip.state - cycle.motion_point_at_slip_arrest.state) / (
+        scene.b * slowed
+    )

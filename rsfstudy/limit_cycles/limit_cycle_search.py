@@ -161,10 +161,12 @@ class LimitCycleSearch:
                     raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
                 if self._should_extrapolate_to_fixed_point():
                     self._distance_at_leap = abs(
-                        cycle.end_point.spring_stress - cycle.start_point.spring_stress
+                        cycle.motion_point_at_end.spring_stress
+                        - cycle.motion_point_at_start.spring_stress
                     )
                     start = self._return_map.section_coordinates_to_point(
-                        extract_section_coordinates(cycle.start_point) + np.array(self._correction)
+                        extract_section_coordinates(cycle.motion_point_at_start)
+                        + np.array(self._correction)
                     )
                     break
 
@@ -212,7 +214,7 @@ class LimitCycleSearch:
         formulas.
         """
         last = self.cycles[-1]
-        begin, end = last.start_point, last.end_point
+        begin, end = last.motion_point_at_start, last.motion_point_at_end
         start = begin.spring_stress, begin.psi
         image = [end.spring_stress, end.psi, *last.compute_primary_output_values()]
         changes = list(map(sub, image, self._image))
@@ -255,7 +257,10 @@ class LimitCycleSearch:
             and _are_within_tolerance(self._image_correction[2:], allowed)
         ):
             return True
-        if len(self.cycles) < 2 or self.cycles[-2].end_point != self.cycles[-1].start_point:
+        if (
+            len(self.cycles) < 2
+            or self.cycles[-2].motion_point_at_end != self.cycles[-1].motion_point_at_start
+        ):
             return False
         if self._last_cycles_alternate():
             return True
@@ -270,7 +275,7 @@ class LimitCycleSearch:
         cannot cross, so exact cycles approach the limit cycle from one side.
         """
         before, last = (
-            cycle.end_point.spring_stress - cycle.start_point.spring_stress
+            cycle.motion_point_at_end.spring_stress - cycle.motion_point_at_start.spring_stress
             for cycle in self.cycles[-2:]
         )
         near = (
@@ -290,7 +295,9 @@ class LimitCycleSearch:
         a loop.
         """
         cycle = self.cycles[-1]
-        left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
+        left = abs(
+            cycle.motion_point_at_end.spring_stress - cycle.motion_point_at_start.spring_stress
+        )
         if not 10.0 * self._noise <= left < 0.5 * self._distance_at_leap:
             return False
         if not _MIN_CONTRACTION_TO_LEAP < self._contraction_ratio_per_cycle < _MAX_CONTRACTION:
@@ -362,11 +369,11 @@ def follow_motion_to_periodic_orbit(
             look = min(2 * look, max_cycles)
             found, off = None, math.inf
             for counted in _list_state_index_sets_to_compare(scene):
-                period, off = find_recurrence_period(scene, seen, counted)
+                period, off = find_recurrence_period_in_cycles(scene, seen, counted)
                 if off < _MAX_RECURRENCE_MISFIT:
                     by = ReturnMap(scene, fine, counted=counted)
                     found = by.find_periodic_orbit(
-                        extract_section_coordinates(cycle.end_point),
+                        extract_section_coordinates(cycle.motion_point_at_end),
                         period,
                         cycle.log_slip_rate_range,
                     )
@@ -391,7 +398,8 @@ def _may_still_converge(cycles: Sequence[StickSlipCycle]) -> bool:
     if len(cycles) < _MIN_CYCLES_BEFORE_RECURRENCE_TEST:
         return True
     latest = [
-        (cycle.log_slip_rate_range, *cycle.end_point.psis) for cycle in cycles[len(cycles) // 2 :]
+        (cycle.log_slip_rate_range, *cycle.motion_point_at_end.psis)
+        for cycle in cycles[len(cycles) // 2 :]
     ]
     changes = np.diff(latest, axis=0)
     return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
@@ -405,10 +413,12 @@ def _list_state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ..
     long after the states of the law.
     """
     of_law = tuple(range(scene.parts.law.state_count))
-    return tuple(dict.fromkeys((scene.friction_functions.indices_of_states_in_distance, of_law)))
+    return tuple(
+        dict.fromkeys((scene.friction_law_functions.state_indices_in_steady_state_distance, of_law))
+    )
 
 
-def find_recurrence_period(
+def find_recurrence_period_in_cycles(
     scene: Scene,
     cycles: Sequence[StickSlipCycle],
     compared_state_indices: Sequence[int] | None = None,
@@ -443,11 +453,11 @@ def find_recurrence_period(
     if len(cycles) < 4:
         return 1, math.inf
     places = list(
-        scene.friction_functions.indices_of_states_in_distance
+        scene.friction_law_functions.state_indices_in_steady_state_distance
         if compared_state_indices is None
         else compared_state_indices
     )
-    states = np.array([cycle.end_point.psis for cycle in cycles])[:, places]
+    states = np.array([cycle.motion_point_at_end.psis for cycle in cycles])[:, places]
     latest, scale = states[len(states) // 2 :], scene.a * cycles[-1].log_slip_rate_range
     longest = min(MAX_PERIOD_IN_CYCLES, len(latest) // 2)
     off = np.array(

@@ -55,7 +55,7 @@ from rsfstudy.status import Status
 
 #: Step of the finite differences of the return map, divided by the product of a and the range of ln
 #: V. The derivatives of the return map vary on a scale of a hundredth of this product.
-FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE = 1e-4
+DIFFERENCE_STEP_OVER_LOG_RATE_RANGE = 1e-4
 _FINITE_DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
 #: Two limits of the search for an orbit. The first limit is the maximum distance of the orbit from
 #: the starting point of the search, divided by the product of a and the range of ln V. The second
@@ -105,7 +105,8 @@ class PeriodicOrbit:
     def start_section_coordinates(self) -> np.ndarray:
         """Section at which the closed orbit begins."""
         return np.asarray(
-            extract_section_coordinates(self.cycles[0].start_point) + self.offset_to_closed_orbit
+            extract_section_coordinates(self.cycles[0].motion_point_at_start)
+            + self.offset_to_closed_orbit
         )
 
     @cached_property
@@ -188,8 +189,8 @@ def extract_section_and_outputs_at_cycle_end(cycle: StickSlipCycle) -> np.ndarra
     """
     return np.array(
         (
-            cycle.end_point.spring_stress,
-            *cycle.end_point.psis,
+            cycle.motion_point_at_end.spring_stress,
+            *cycle.motion_point_at_end.psis,
             *cycle.compute_primary_output_values(),
         )
     )
@@ -250,7 +251,9 @@ class ReturnMap:
         self.scene, self.integrator = scene, integrator
         self._with_recording = recorded
         places = (
-            scene.friction_functions.indices_of_states_in_distance if counted is None else counted
+            scene.friction_law_functions.state_indices_in_steady_state_distance
+            if counted is None
+            else counted
         )
         #: Indices of the section components that contribute to the distance between sections.
         self._compared_unknowns = [0, *(1 + place for place in places)]
@@ -277,9 +280,9 @@ class ReturnMap:
             If forward slip is impossible at this spring stress.
         """
         spring_stress, *psis = section_coordinates.tolist()
-        point = Integrator.restart_point(self.scene, spring_stress, tuple(psis))
+        point = Integrator.compute_restart_point(self.scene, spring_stress, tuple(psis))
         return (
-            Integrator.point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
+            Integrator.compute_point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
             if self._inertia_matters_at(point)
             else point
         )
@@ -366,7 +369,7 @@ class ReturnMap:
         """
         found, step = (
             list[np.ndarray](),
-            FINITE_DIFFERENCE_OVER_LOG_RATE_RANGE
+            DIFFERENCE_STEP_OVER_LOG_RATE_RANGE
             * math.sqrt(self.integrator.accuracy.refinement)
             * state_scale,
         )
@@ -562,7 +565,7 @@ class ReturnMap:
             seen = self.follow_cycles(at, len(return_map_derivatives_per_cycle), recording)
             if len(seen) < len(return_map_derivatives_per_cycle):
                 return None
-            off = extract_section_coordinates(seen[-1].end_point) - at
+            off = extract_section_coordinates(seen[-1].motion_point_at_end) - at
             if move is not None:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
@@ -604,10 +607,10 @@ class ReturnMap:
         self, cycles: Sequence[StickSlipCycle], state_scale: float
     ) -> int:
         """Return the number of cycles after which an orbit repeats itself."""
-        begin = extract_section_coordinates(cycles[0].start_point)
+        begin = extract_section_coordinates(cycles[0].motion_point_at_start)
         for count in range(1, len(cycles)):
             apart = self._compute_largest_scaled_section_change(
-                extract_section_coordinates(cycles[count - 1].end_point) - begin,
+                extract_section_coordinates(cycles[count - 1].motion_point_at_end) - begin,
                 begin,
                 state_scale,
             )

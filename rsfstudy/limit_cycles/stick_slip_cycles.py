@@ -70,15 +70,15 @@ class StickSlipCycle(NamedTuple):
         Smallest value of ln(V/V_*) during the cycle.
     max_log_slip_rate : float
         Largest value of ln(V/V_*) during the cycle.
-    slip_arrest_point : MotionPoint
+    motion_point_at_slip_arrest : MotionPoint
         First point after the rupture at which V is below V_0 and friction balances the spring. If
         friction never balances the spring after the rupture, the attribute contains the point with
         the lowest slip rate.
-    slowest_slip_point : MotionPoint
+    motion_point_at_slowest_slip : MotionPoint
         Point with the lowest slip rate.
-    start_point : MotionPoint
+    motion_point_at_start : MotionPoint
         Maximum of spring stress at which the cycle begins.
-    end_point : MotionPoint
+    motion_point_at_end : MotionPoint
         Maximum of spring stress at which the cycle ends.
     """
 
@@ -89,10 +89,10 @@ class StickSlipCycle(NamedTuple):
     friction_coefficient_at_peak_rate: float
     min_log_slip_rate: float
     max_log_slip_rate: float
-    slip_arrest_point: MotionPoint
-    slowest_slip_point: MotionPoint
-    start_point: MotionPoint
-    end_point: MotionPoint
+    motion_point_at_slip_arrest: MotionPoint
+    motion_point_at_slowest_slip: MotionPoint
+    motion_point_at_start: MotionPoint
+    motion_point_at_end: MotionPoint
 
     @property
     def log_slip_rate_range(self) -> float:
@@ -113,7 +113,7 @@ class StickSlipCycle(NamedTuple):
             Recurrence interval, static stress drop, dynamic stress drop, and decimal logarithms of
             the smallest and of the largest V/V_*.
         """
-        highest = self.start_point.spring_stress
+        highest = self.motion_point_at_start.spring_stress
         drops = (
             highest - self.min_spring_stress_deviation,
             highest - self.spring_stress_deviation_at_peak_rate,
@@ -227,7 +227,7 @@ def extract_recorded_rows_of_cycles(
     elongation, :math:`V_0 T - (f_1 - f_0)/K`. Here :math:`T` is the duration of the cycles, and
     :math:`f_0` and :math:`f_1` are the spring stresses at the beginning and at the end.
     """
-    begin, end = cycles[0].start_point, cycles[-1].end_point
+    begin, end = cycles[0].motion_point_at_start, cycles[-1].motion_point_at_end
     passed = math.fsum(cycle.recurrence_interval for cycle in cycles)
     slip = (
         scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
@@ -284,10 +284,10 @@ def _build_cycle_from_events(
         friction_coefficient_at_peak_rate=fastest.friction_coefficient,
         min_log_slip_rate=rested.log_slip_rate,
         max_log_slip_rate=fastest.log_slip_rate,
-        slip_arrest_point=_find_slip_arrest_point(events) or rested,
-        slowest_slip_point=rested,
-        start_point=start_point,
-        end_point=end.point,
+        motion_point_at_slip_arrest=_find_slip_arrest_point(events) or rested,
+        motion_point_at_slowest_slip=rested,
+        motion_point_at_start=start_point,
+        motion_point_at_end=end.point,
     )
 
 

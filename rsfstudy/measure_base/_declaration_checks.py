@@ -21,7 +21,7 @@ OutputValue = float | np.ndarray
 PlainValue = int | float | str | bool
 
 
-def check_declared_work_estimates(
+def check_declared_cost_estimates(
     typical_work: object, expected_work: Callable[[Accuracy], float]
 ) -> None:
     """Check that the typical and the expected work are positive numbers.

@@ -45,7 +45,11 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     check_loading_has_no_noise(scene)
     loading = scene.parts.loading
     if loading.unknowns:
-        what = "load point velocity" if loading.has_load_point_unknown else "normal stress"
+        what = (
+            "load point velocity"
+            if loading.adds_load_point_displacement_unknown
+            else "normal stress"
+        )
         rule = (
             f"cannot be used here, because it changes the {what} continuously, so the motion does "
             "not reach a steady state or a limit cycle"

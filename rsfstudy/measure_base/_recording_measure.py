@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rsfstudy._deprecation import build_getattr_for_former_names
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base.measure import Measure
 from rsfstudy.quantities import Output
 from rsfstudy.slider import cached_attribute
@@ -42,7 +42,7 @@ def create_outputs_along_phase(*names: str) -> tuple[Output, ...]:
     return tuple(Output(name, dims=("phase",)) for name in names)
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class RecordingMeasure(Measure):
     """Base class of measures whose results include a record along ``phase``.

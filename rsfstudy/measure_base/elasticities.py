@@ -11,8 +11,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base.measure import Measure, Outcome, OutputValue
 from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.quantities import Output, Quantity
@@ -21,7 +21,7 @@ from rsfstudy.status import Status
 
 #: Fields of a scene that hold numbers.
 NUMERIC_SCENE_FIELD_NAMES = tuple(
-    name for name, kind in SceneFields.TYPES.items() if kind in (float, float | None)
+    name for name, kind in SceneFields.VALUE_TYPE_BY_NAME.items() if kind in (float, float | None)
 )
 #: Scene fields of shear heating, thermal pressurisation and flash heating. By default,
 #: ``parameters`` does not contain these fields, so that the results of scenes without heating do
@@ -58,7 +58,7 @@ _STENCIL, _FOURTH_DIFFERENCE_WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, 
 #: Estimated truncation error of an elasticity, divided by the difference between the results of the
 #: fourth-order and the second-order formula. In random scenes, the largest ratio of the true
 #: truncation error to this difference is 0.14, and occurs with the largest steps.
-_TRUNCATION_ERROR_OVER_FORMULA_DIFFERENCE = 0.25
+_ERROR_OVER_RICHARDSON_CORRECTION = 0.25
 #: Constants of the step selection. The first item contains fractions of the largest step of ln p.
 #: The fractions are tried in turn if the result of the measure does not exist for a smaller or for
 #: a larger parameter value, or if the relative error of the derivative exceeds the second item. The
@@ -83,7 +83,7 @@ class _LogValueWithError(NamedTuple):
     log_value_error: float
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Elasticities(Measure):
     r"""Elasticities of the main result of a measure.
@@ -450,9 +450,7 @@ def _compute_central_difference(
         )
         # The bound assumes that the fifth derivative is at most the fourth derivative divided by
         # the distance of the outer points.
-        left = _TRUNCATION_ERROR_OVER_FORMULA_DIFFERENCE * abs(correction) + fourth / (
-            12.0 * log_step
-        )
+        left = _ERROR_OVER_RICHARDSON_CORRECTION * abs(correction) + fourth / (12.0 * log_step)
         return near + correction, left + of_levels, of_levels
     if below and above:
         slope = (above.log_value - below.log_value) / (2.0 * log_step)

@@ -19,9 +19,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_overrides
-from rsfstudy.error_boundary import ConstructorKeywordCheckMixin, wrap_methods_in_error_boundary
+from rsfstudy._deprecation import add_former_member_names, copy_former_overrides_to_new_names
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import (
+    ConstructorKeywordCheckMixin,
+    make_methods_raise_rsfstudy_errors,
+)
 from rsfstudy.measure_base import _declaration_checks
 from rsfstudy.measure_base._declaration_checks import OutputValue as OutputValue
 from rsfstudy.measure_base._declaration_checks import PlainValue
@@ -43,7 +46,7 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Outcome:
     """Results of a measure for one scene.
@@ -87,7 +90,7 @@ RESERVED_NAMES = frozenset(
 
 
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Measure(ConstructorKeywordCheckMixin):
     """Base class of all measures.
@@ -150,12 +153,12 @@ class Measure(ConstructorKeywordCheckMixin):
     needs_time: ClassVar[tuple[bool, ...]] = (True,)
     #: Fields that descriptions and cell keys contain only if the value is not the default. Declare
     #: a field here if an existing measure gets a new field, so that files remain identical.
-    fields_omitted_if_default: ClassVar[tuple[str, ...]] = ()
+    fields_stored_unless_default: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         """Adopt former names of members that the subclass defines."""
         super().__init_subclass__()
-        add_new_names_for_former_overrides(cls)
+        copy_former_overrides_to_new_names(cls)
         accept_deprecated_accuracy_and_meter(cls)
 
     @property
@@ -254,7 +257,7 @@ class Measure(ConstructorKeywordCheckMixin):
         float
             The typical number of evaluations, scaled to the accuracy.
         """
-        return self.typical_work * compute_relative_work_at_accuracy(accuracy, self.work_by_digits)
+        return self.typical_work * compute_relative_cost_at_accuracy(accuracy, self.work_by_digits)
 
     @property
     def plain_fields(self) -> dict[str, PlainValue]:
@@ -266,11 +269,11 @@ class Measure(ConstructorKeywordCheckMixin):
         return {name: value for name, value in values.items() if isinstance(value, PlainValue)}
 
     @property
-    def omitted_fields(self) -> frozenset[str]:
+    def fields_omitted_from_storage(self) -> frozenset[str]:
         """Names of the fields that descriptions and cell keys omit."""
         defaults = {
             name: type(self).__dataclass_fields__[name].default
-            for name in self.fields_omitted_if_default
+            for name in self.fields_stored_unless_default
         }
         return frozenset(n for n, default in defaults.items() if getattr(self, n) == default)
 
@@ -376,7 +379,7 @@ class Measure(ConstructorKeywordCheckMixin):
             _check_names_declared_by_measure(self)
             for name, values in self.inner_coordinates.items():
                 _declaration_checks.check_coordinate_values(name, values)
-            _declaration_checks.check_declared_work_estimates(self.typical_work, self.expected_work)
+            _declaration_checks.check_declared_cost_estimates(self.typical_work, self.expected_work)
             _declaration_checks.check_measure_description(self.name, self.describe)
         except InvalidValue:
             raise
@@ -544,7 +547,7 @@ class Measure(ConstructorKeywordCheckMixin):
         dict
             Name of the measure, and values of its fields.
         """
-        omitted = self.omitted_fields
+        omitted = self.fields_omitted_from_storage
         return {"name": self.name, **{n: v for n, v in asdict(self).items() if n not in omitted}}
 
     @classmethod
@@ -563,7 +566,7 @@ class Measure(ConstructorKeywordCheckMixin):
         dict
             Field values by name. The base class returns the default values of omitted fields.
         """
-        omitted = [name for name in cls.fields_omitted_if_default if name not in described]
+        omitted = [name for name in cls.fields_stored_unless_default if name not in described]
         return {name: cls.__dataclass_fields__[name].default for name in omitted}
 
 
@@ -629,7 +632,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             )
 
 
-def compute_relative_work_at_accuracy(
+def compute_relative_cost_at_accuracy(
     accuracy: Accuracy, work_by_digits: Mapping[float, float]
 ) -> float:
     """Return the cost at a requested accuracy, relative to the default accuracy.

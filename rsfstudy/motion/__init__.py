@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         accept_deprecated_accuracy_and_meter,
     )
     from rsfstudy.motion.engine_factory import Engine
-    from rsfstudy.motion.events import (
+    from rsfstudy.motion.integration_events import (
         Event,
         EventKind,
         EventSpecification,
@@ -58,7 +58,7 @@ else:
             ),
             "motion.motion_driver": ("MotionDriver",),
             "motion.engine_factory": ("Engine",),
-            "motion.events": (
+            "motion.integration_events": (
                 "Event",
                 "EventKind",
                 "EventSpecification",

@@ -9,8 +9,8 @@ from numbers import Real
 from typing import ClassVar
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.motion.engines import SCIPY, resolve_engine_name
 
 #: Default value and limits of the relative tolerance ``Accuracy.rtol``.
@@ -32,7 +32,7 @@ RELATIVE_ROUNDING_ERROR = 1e-13
 
 
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Accuracy:
     """Requested accuracy of results, and limits of the computation.

@@ -14,8 +14,8 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import find_stacklevel_of_user_code
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.work_meter import WorkMeter

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from rsfstudy.motion import array_layout
-from rsfstudy.motion.events import EventKind, EventSpecification
-from rsfstudy.motion.step_events import BEFORE_JUMP, NO_EVENT, find_jump_side_of_event
+from rsfstudy.motion.integration_events import EventKind, EventSpecification
+from rsfstudy.motion.integration_step_events import BEFORE_JUMP, NO_EVENT, find_jump_side_of_event
 from rsfstudy.slider import FloatTuple, MotionPoint
 
 _CODE_BY_EVENT_KIND = {
@@ -35,7 +35,7 @@ _KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
 ]
 
 
-def find_events_at_jump(
+def find_events_at_stress_jump(
     point_before: MotionPoint,
     parameters_before: FloatTuple,
     point_after: MotionPoint,

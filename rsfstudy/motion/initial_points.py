@@ -74,7 +74,7 @@ def compute_point_before_start(scene: Scene) -> MotionPoint:
     psis = before.compute_steady_states(0.0, 0.0)
     if scene.starts_unsteady:
         psis = _find_specified_initial_states(scene, psis)[0]
-    return before.slow_manifold_point(scene.parts.slider.initial_stress, psis)
+    return before.compute_slow_manifold_point(scene.parts.slider.initial_stress, psis)
 
 
 def build_point_without_derived_values(
@@ -105,7 +105,7 @@ def build_point_without_derived_values(
         Point of the motion. Fields that are not arguments of this function are NaN. The first event
         of the motion contains the computed values of all fields.
     """
-    psi = scene.friction_functions.state_sum(states)
+    psi = scene.friction_law_functions.state_sum(states)
     known = log_slip_rate, math.nan, spring_stress, frictional_stress, psi
     return MotionPoint._make((*known, *_NAN_FOR_UNEVALUATED_POINT_FIELDS, states))
 
@@ -164,7 +164,7 @@ def _find_specified_initial_states(
     others = steady_states[1 : before.state_count]
 
     def begun(psi: float) -> MotionPoint:
-        return before.slow_manifold_point(scene.initial_stress, (psi, *others))
+        return before.compute_slow_manifold_point(scene.initial_stress, (psi, *others))
 
     def missing(psi: float) -> float:
         return scene.initial_state - begun(psi).state
@@ -232,7 +232,7 @@ def compute_point_with_slip_rate(
         If normal stress vanishes.
     """
     excess = scene.a * log_slip_rate + point.psi
-    friction = scene.frictional_stress_after_jump(excess, point.psis)
+    friction = scene.frictional_stress_from_strength(excess, point.psis)
     if friction is None:
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the normal stress vanishes at the step")
     return point._replace(log_slip_rate=log_slip_rate, frictional_stress=friction)
@@ -259,10 +259,10 @@ def check_forward_slip_is_possible_at_start(
     slider = scene.parts.slider
     begins = slider.initial_stress + scene.spring_stress_step
     spring_stress = begins if start_point is None else start_point.spring_stress
-    lost = spring_stress <= scene.parts.normal_stress.min_frictional_stress(scene)
+    lost = spring_stress <= scene.parts.normal_stress.compute_frictional_stress_lower_bound(scene)
     if lost or (
         start_point
-        and scene.effective_normal_stress_at(spring_stress, start_point.psis)
+        and scene.compute_effective_normal_stress(spring_stress, start_point.psis)
         <= regime_switching.MIN_NORMAL_STRESS
     ):
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the normal stress vanishes at the step")

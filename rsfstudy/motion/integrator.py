@@ -12,27 +12,27 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.motion import initial_points
 from rsfstudy.motion.accuracy import Accuracy, estimate_error
-from rsfstudy.motion.continuous_segments import (
-    drop_settling_events_if_unstable,
-    find_segments_left_to_integrate,
+from rsfstudy.motion.continuous_loading_segments import (
+    find_remaining_loading_segments,
     iterate_segment_start_events,
-    prepare_segment_with_noise,
+    prepare_noisy_loading_segment,
+    remove_settling_events_if_unstable,
     select_event_specs_that_can_occur,
     split_segments_at_stress_jumps,
-    truncate_segment_table_at_time,
+    truncate_loading_segments_at_time,
 )
-from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import compute_initial_point, compute_point_after_loading_jump
+from rsfstudy.motion.integration_events import Event, EventKind, EventSpecification
 from rsfstudy.motion.motion_driver import MotionDriver, get_motion_driver
 from rsfstudy.motion.recording import MotionRecorder
 from rsfstudy.motion.regime_switching import (
     compute_regime_switch_thresholds,
     is_inertia_significant_at,
 )
-from rsfstudy.motion.work_meter import MIN_LOCAL_TOLERANCE, WorkMeter
+from rsfstudy.motion.work_meter import MIN_LOCAL_ERROR_TOLERANCE, WorkMeter
 from rsfstudy.parts import (
     LOADING,
     LOG_LOAD_VELOCITY,
@@ -42,7 +42,7 @@ from rsfstudy.parts import (
 from rsfstudy.slider import EquationsOfMotion, FloatTuple, MotionPoint, Scene
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 class Integrator:
     """Integrator of motions with a requested accuracy and a work counter.
 
@@ -70,12 +70,12 @@ class Integrator:
     __slots__ = ("accuracy", "work_meter")
 
     #: Smallest possible value of ``local_tolerance``.
-    MIN_LOCAL_TOLERANCE = MIN_LOCAL_TOLERANCE
+    MIN_LOCAL_ERROR_TOLERANCE = MIN_LOCAL_ERROR_TOLERANCE
 
-    initial_point = staticmethod(initial_points.compute_initial_point)
-    point_before_start = staticmethod(initial_points.compute_point_before_start)
-    restart_point = staticmethod(initial_points.compute_restart_point)
-    point_with_slip_rate = staticmethod(initial_points.compute_point_with_slip_rate)
+    compute_initial_point = staticmethod(initial_points.compute_initial_point)
+    compute_point_before_start = staticmethod(initial_points.compute_point_before_start)
+    compute_restart_point = staticmethod(initial_points.compute_restart_point)
+    compute_point_with_slip_rate = staticmethod(initial_points.compute_point_with_slip_rate)
 
     def __init__(self, accuracy: Accuracy) -> None:
         """Create an integrator whose evaluation count is zero."""
@@ -358,7 +358,7 @@ class Integrator:
         with_time = with_time or scene.parts.loading_noise.is_active
         time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_start_count
         if resume_from is not None:
-            chains, start = find_segments_left_to_integrate(scene, resume_from)
+            chains, start = find_remaining_loading_segments(scene, resume_from)
             time, slip = resume_from.time, resume_from.slip
         for number, (acting, table) in enumerate(chains):
             if start is None:
@@ -369,10 +369,12 @@ class Integrator:
             asked = select_event_specs_that_can_occur(
                 scene, acting, event_specs, includes_last_segment=is_last
             )
-            table = truncate_segment_table_at_time(table, until)
+            table = truncate_loading_segments_at_time(table, until)
             end, further, parameters = float(table[-1, SEGMENT_END]), None, None
             if scene.parts.loading_noise.is_active:
-                start, parameters, table, further = prepare_segment_with_noise(acting, start, table)
+                start, parameters, table, further = prepare_noisy_loading_segment(
+                    acting, start, table
+                )
                 told = 0  # Every loading segment starts a chain, which reports its start.
             motion = get_motion_driver(
                 acting, self.engine, self.accuracy.methods, include_time_equation=with_time
@@ -390,12 +392,12 @@ class Integrator:
                 recording=recording,
                 later_segments_and_reported_count=(table[1:], told),
                 initial_imposed_stress=acting.parameter_values[LOADING + 2]
-                if acting.parts.loading.has_load_point_unknown
+                if acting.parts.loading.adds_load_point_displacement_unknown
                 else None,
                 parameters=parameters,
                 noise_segment_tables=further,
             )
-            motion = drop_settling_events_if_unstable(scene, motion)
+            motion = remove_settling_events_if_unstable(scene, motion)
             if before is None and end == math.inf:  # The motion consists of a single chain.
                 yield from motion
                 return

@@ -22,12 +22,12 @@ from rsfstudy.motion.event_spec_table import (
     pack_event_specifications_into_table,
     pack_point_into_array,
 )
-from rsfstudy.motion.events import Event, EventSpecification
-from rsfstudy.motion.overflow_reports import describe_overflow
+from rsfstudy.motion.integration_events import Event, EventSpecification
+from rsfstudy.motion.overflow_reports import call_and_describe_overflow
 from rsfstudy.motion.python_backend import PythonBackend
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
-    SAMPLES_PER_STEP,
+    SAMPLES_PER_INTEGRATION_STEP,
     SPRING_AND_FRICTIONAL_STRESS_COLUMNS,
     MotionRecorder,
 )
@@ -37,8 +37,8 @@ from rsfstudy.motion.regime_switching import (
     build_termination_error,
 )
 from rsfstudy.motion.work_meter import (
-    MAX_STEP_SCALING_REFERENCE_TOLERANCE,
-    MIN_LOCAL_TOLERANCE,
+    MIN_LOCAL_ERROR_TOLERANCE,
+    REFERENCE_TOLERANCE_FOR_MAX_STEP_LENGTH,
     MotionStopped,
     WorkMeter,
 )
@@ -221,7 +221,7 @@ class MotionDriver:
             if turns:
                 before = machine.convert_parameters_for_motion_loop(numbers)
             systems = (system._replace(parameters=numbers) for system in self._equations)
-        tolerance = max(tolerance, MIN_LOCAL_TOLERANCE)
+        tolerance = max(tolerance, MIN_LOCAL_ERROR_TOLERANCE)
         records, samples, rows = _prepare_recording_tables(recording, self._equations[0], states)
         state = machine.create_motion_state(
             self._initial_values,
@@ -229,7 +229,7 @@ class MotionDriver:
                 *(*duration_start_time_and_slip, stress, tolerance),
                 # The step limit depends on the tolerance. Otherwise, two runs with different
                 # tolerances could share an error, and their difference would not reveal the error.
-                (tolerance / MAX_STEP_SCALING_REFERENCE_TOLERANCE) ** 0.125,
+                (tolerance / REFERENCE_TOLERANCE_FOR_MAX_STEP_LENGTH) ** 0.125,
                 -1.0 if backward else 1.0,
                 int(min(evaluation_budget, work_meter.budget - work_meter.evaluations)),
                 *(records, turns, later_segments_and_reported_count[1]),
@@ -252,7 +252,9 @@ class MotionDriver:
         run, end, known = machine.get_motion_loop_function(), array_layout.PAUSED, (0, 0, 0, 0)
         while end == array_layout.PAUSED:
             end = run(state.motion_state_array, *arguments)
-            slow, fast, steps, happened, recorded, jacobians = state.get_work_and_table_row_counts()
+            slow, fast, steps, happened, recorded, jacobians = (
+                state.get_evaluation_and_table_row_counts()
+            )
             known, settled = (slow, fast, steps, jacobians), known
             others = work_meter.charge_work_since_last_call(regimes, settled, known)
             if recording is not None and recorded:
@@ -289,7 +291,9 @@ class MotionDriver:
             if end in (array_layout.NO_STEP_POSSIBLE, array_layout.INVALID_STEP):
                 system = self._equations[int(state.get_motion_state_field("regime"))]
                 unknowns = tuple(y[: len(system.unknown_names)].tolist())
-                overflow = describe_overflow(system.rate_function, unknowns, tuple(numbers))
+                overflow = call_and_describe_overflow(
+                    system.rate_function, unknowns, tuple(numbers)
+                )
             raise _build_motion_stopped_error(end, state, regimes, stepper, overflow)
 
 
@@ -354,7 +358,9 @@ def _prepare_recording_tables(
             np.empty((_RECORDING_ROWS, FIRST_STATE_COLUMN + state_count)),
         )
     samples = recording.list_unrecorded_sample_times()
-    rows = np.empty((len(samples) + 2 * SAMPLES_PER_STEP, FIRST_STATE_COLUMN + state_count))
+    rows = np.empty(
+        (len(samples) + 2 * SAMPLES_PER_INTEGRATION_STEP, FIRST_STATE_COLUMN + state_count)
+    )
     return (
         array_layout.RECORD_AT_CLOCKS if equations.is_rigid else array_layout.RECORD_AT_TIMES,
         samples,

@@ -72,34 +72,34 @@ from rsfstudy.motion.array_operations import (
     copy_values,
     evaluate_function_into_array,
 )
-from rsfstudy.motion.recording import SAMPLES_PER_STEP
+from rsfstudy.motion.integration_step_events import (
+    append_events_in_step,
+    append_regime_or_segment_start_events,
+    append_step_end_event,
+)
+from rsfstudy.motion.integration_step_root_conditions import may_any_event_be_reported_later
+from rsfstudy.motion.integration_step_samples import (
+    record_regime_start,
+    record_step_samples,
+    should_record_step,
+)
+from rsfstudy.motion.integration_step_truncation import (
+    has_rupture_regime_ended,
+    is_step_end_valid,
+    truncate_step_at_end_of_regime_or_segment,
+)
+from rsfstudy.motion.integration_steps import (
+    compute_time_at_step_end,
+    halve_step_until_dense_output_is_accurate,
+    take_step,
+)
+from rsfstudy.motion.recording import SAMPLES_PER_INTEGRATION_STEP
 from rsfstudy.motion.regime_starts import (
     enter_initial_regime,
     set_initial_unknowns_of_regime,
     start_next_segment,
 )
 from rsfstudy.motion.regime_switching import CONTINUES, RegimeSwitchThresholds
-from rsfstudy.motion.step_events import (
-    append_events_in_step,
-    append_start_events,
-    append_step_end_event,
-)
-from rsfstudy.motion.step_integration import (
-    compute_time_at_step_end,
-    halve_step_until_dense_output_is_accurate,
-    take_step,
-)
-from rsfstudy.motion.step_root_conditions import may_any_event_be_reported_later
-from rsfstudy.motion.step_samples import (
-    record_regime_start,
-    record_step_samples,
-    should_record_step,
-)
-from rsfstudy.motion.step_truncation import (
-    has_rupture_regime_ended,
-    is_step_end_valid,
-    truncate_step_at_end_of_regime_or_segment,
-)
 from rsfstudy.motion.steppers import begin_integration_of_regime
 from rsfstudy.motion.workspace import create_workspace
 
@@ -233,7 +233,7 @@ def are_output_tables_nearly_full(motion, event_spec_count, event_table, recordi
     full = len(event_table) - motion.event_rows < 2 * event_spec_count + 4
     return full or (
         len(recording_table) > 0
-        and len(recording_table) - motion.recorded_rows < 2 * SAMPLES_PER_STEP
+        and len(recording_table) - motion.recorded_rows < 2 * SAMPLES_PER_INTEGRATION_STEP
     )
 
 
@@ -302,7 +302,7 @@ def integrate_one_regime(
         leaves, over = truncate_step_at_end_of_regime_or_segment(motion, workspace)
         if motion.pending_start:
             record_regime_start(motion, workspace, recording_table)
-            if append_start_events(motion, workspace, last_point, event_table):
+            if append_regime_or_segment_start_events(motion, workspace, last_point, event_table):
                 return MOTION_ENDED
         complete = motion.recording_mode and record_step_samples(
             motion, workspace, recording_table, requested_samples, over

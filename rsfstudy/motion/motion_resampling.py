@@ -11,7 +11,7 @@ from rsfstudy.motion.engines import SCIPY
 from rsfstudy.motion.recording import (
     MOTION_VARIABLE_NAMES,
     SAMPLE_NUMBER_COLUMN,
-    SAMPLES_PER_STEP,
+    SAMPLES_PER_INTEGRATION_STEP,
     resample_along_path,
 )
 
@@ -58,7 +58,7 @@ def resample_motion_along_path(
     path, at, room = (
         np.zeros(len(recorded_rows)),
         np.empty(point_count),
-        np.empty(SAMPLES_PER_STEP + 1),
+        np.empty(SAMPLES_PER_INTEGRATION_STEP + 1),
     )
     seen = [columns[place] for place in (*_COLUMNS_DEFINING_PATH_LENGTH, SAMPLE_NUMBER_COLUMN)]
     call_array_function_with_engine(

@@ -17,7 +17,7 @@ from rsfstudy.motion.recording import (
     MOTION_VARIABLE_NAMES,
     REGIME_COLUMN,
     SAMPLE_NUMBER_COLUMN,
-    SAMPLES_PER_STEP,
+    SAMPLES_PER_INTEGRATION_STEP,
     SPRING_AND_FRICTIONAL_STRESS_COLUMNS,
 )
 from rsfstudy.parts import (
@@ -89,7 +89,8 @@ def estimate_neglected_inertia_error(
     # Residuals are evaluated at the middle and end of each step and at the beginning of each
     # regime.
     used = np.flatnonzero(
-        on_manifold & (recorded_rows[:, SAMPLE_NUMBER_COLUMN] % (SAMPLES_PER_STEP // 2) == 0.0)
+        on_manifold
+        & (recorded_rows[:, SAMPLE_NUMBER_COLUMN] % (SAMPLES_PER_INTEGRATION_STEP // 2) == 0.0)
     )
     jumps = np.cumsum(np.where(arrives, slips, 0.0))
     if not used.size:
@@ -101,7 +102,7 @@ def estimate_neglected_inertia_error(
     # steeply.
     numbers = np.arange(len(recorded_rows))
     number = np.minimum(np.searchsorted(used, numbers), used.size - 1)
-    number -= (np.abs(used[number] - numbers) >= SAMPLES_PER_STEP // 2) & (number > 0)
+    number -= (np.abs(used[number] - numbers) >= SAMPLES_PER_INTEGRATION_STEP // 2) & (number > 0)
     return _ERROR_SAFETY_FACTOR * (jumps + left[number])
 
 

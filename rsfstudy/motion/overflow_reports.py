@@ -18,11 +18,11 @@ from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.parts import Part
 from rsfstudy.status import Status
 
-Parameters = ParamSpec("Parameters")
-Result = TypeVar("Result")
+FunctionParameters = ParamSpec("FunctionParameters")
+FunctionResult = TypeVar("FunctionResult")
 
 
-def describe_overflow(function: Callable[..., Any], *arguments: Any) -> str:
+def call_and_describe_overflow(function: Callable[..., Any], *arguments: Any) -> str:
     """Call a function, and describe the overflow if the call overflows.
 
     Parameters
@@ -46,8 +46,8 @@ def describe_overflow(function: Callable[..., Any], *arguments: Any) -> str:
 
 
 def convert_overflow_to_motion_stopped(
-    function: Callable[Parameters, Result],
-) -> Callable[Parameters, Result]:
+    function: Callable[FunctionParameters, FunctionResult],
+) -> Callable[FunctionParameters, FunctionResult]:
     """Decorate a function that evaluates the equations at an initial point.
 
     Parameters
@@ -62,7 +62,9 @@ def convert_overflow_to_motion_stopped(
     """
 
     @functools.wraps(function)
-    def evaluate(*args: Parameters.args, **options: Parameters.kwargs) -> Result:
+    def evaluate(
+        *args: FunctionParameters.args, **options: FunctionParameters.kwargs
+    ) -> FunctionResult:
         try:
             return function(*args, **options)
         except OverflowError as error:
@@ -76,7 +78,7 @@ def convert_overflow_to_motion_stopped(
 def _describe_overflow_error(error: OverflowError) -> str:
     """Describe the part function that overflowed, and list its arguments."""
     for frame in _iterate_frames(error):
-        if owner := _find_owner(frame):
+        if owner := _find_part_and_function_of_frame(frame):
             return (
                 f"the function {owner} overflows ({shorten_text(error)}) for "
                 f"{_format_arguments(frame)}. Limit the exponents in the function, for example to "
@@ -93,7 +95,7 @@ def _iterate_frames(error: BaseException) -> Iterator[FrameType]:
         traceback = traceback.tb_next
 
 
-def _find_owner(frame: FrameType) -> str:
+def _find_part_and_function_of_frame(frame: FrameType) -> str:
     """Return the names of the part and of the function executed in a frame."""
     for part in _iterate_subclasses(Part):
         for name, member in vars(part).items():

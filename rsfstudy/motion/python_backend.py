@@ -138,7 +138,7 @@ class PythonMotionState(SimpleNamespace):
         """Argument ``motion_state_array`` of the event loop."""
         return [self]
 
-    def get_work_and_table_row_counts(self) -> tuple[int, ...]:
+    def get_evaluation_and_table_row_counts(self) -> tuple[int, ...]:
         """Return the counters of evaluations, steps and table rows.
 
         Returns

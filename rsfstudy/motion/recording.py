@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
-from rsfstudy.motion.events import Event
+from rsfstudy.motion.integration_events import Event
 from rsfstudy.slider import MotionPoint, Scene
 
 #: Names of the first columns of a recorded motion.
@@ -36,14 +36,14 @@ SPRING_AND_FRICTIONAL_STRESS_COLUMNS = slice(
 #: Names of all recorded variables. The last variable is the apparent friction that a rig measures.
 RECORDED_VARIABLE_NAMES = (*MOTION_VARIABLE_NAMES, "friction_coefficient")
 #: Columns after the recorded variables: the regime, the sample number within the step, and the
-#: first state. The sample number is 0 at the beginning of a regime and ``SAMPLES_PER_STEP`` at the
-#: end of each step.
+#: first state. The sample number is 0 at the beginning of a regime and
+#: ``SAMPLES_PER_INTEGRATION_STEP`` at the end of each step.
 REGIME_COLUMN, SAMPLE_NUMBER_COLUMN, FIRST_STATE_COLUMN = range(
     len(RECORDED_VARIABLE_NAMES), len(RECORDED_VARIABLE_NAMES) + 3
 )
 #: Number of samples per integration step. With this number of samples, the interpolating polynomial
 #: looks smooth in plots.
-SAMPLES_PER_STEP = 6
+SAMPLES_PER_INTEGRATION_STEP = 6
 
 
 @dataclass
@@ -63,7 +63,7 @@ class MotionRecorder:
 
     #: Names of the first columns of a recorded motion, and of all recorded variables.
     MOTION_VARIABLE_NAMES: ClassVar = MOTION_VARIABLE_NAMES
-    VARIABLE_NAMES: ClassVar = RECORDED_VARIABLE_NAMES
+    RECORDED_VARIABLE_NAMES: ClassVar = RECORDED_VARIABLE_NAMES
     #: Columns after the recorded variables.
     REGIME_COLUMN: ClassVar = REGIME_COLUMN
     SAMPLE_NUMBER_COLUMN: ClassVar = SAMPLE_NUMBER_COLUMN
@@ -72,7 +72,7 @@ class MotionRecorder:
     regime_names: list[str] = field(default_factory=list)
     sample_times: np.ndarray | None = None
     _row_blocks: list[np.ndarray] = field(default_factory=list)
-    _time_capped_block_count: int = 0
+    _block_count_with_capped_times: int = 0
 
     def get_or_add_regime_index(self, regime_name: str) -> int:
         """Return the index of a regime, and add new regimes to the list.
@@ -131,11 +131,11 @@ class MotionRecorder:
         """
         if self.sample_times is not None:
             return
-        for rows in self._row_blocks[self._time_capped_block_count :]:
+        for rows in self._row_blocks[self._block_count_with_capped_times :]:
             np.minimum(rows[:, 0], end_time, out=rows[:, 0])
-        if self._time_capped_block_count < len(self._row_blocks):
+        if self._block_count_with_capped_times < len(self._row_blocks):
             self._row_blocks[-1][-1:, 0] = end_time
-        self._time_capped_block_count = len(self._row_blocks)
+        self._block_count_with_capped_times = len(self._row_blocks)
 
     def as_table(self, scene: Scene, end_event: Event | None = None) -> np.ndarray:
         """Return the recorded motion as a table.
@@ -321,26 +321,26 @@ def truncate_recording_at_row(recorded_rows: np.ndarray, last_row: np.ndarray) -
     place = int(recorded_rows[after, SAMPLE_NUMBER_COLUMN]) if after < len(recorded_rows) else 0
     begin = after - place
     # If the recording ends before the end of the step, no samples need to be replaced.
-    if not place or begin + SAMPLES_PER_STEP >= len(recorded_rows):
+    if not place or begin + SAMPLES_PER_INTEGRATION_STEP >= len(recorded_rows):
         return np.vstack([recorded_rows[:after], last_row])
-    part, times = float(place), recorded_rows[begin : begin + SAMPLES_PER_STEP + 1, 0]
+    part, times = float(place), recorded_rows[begin : begin + SAMPLES_PER_INTEGRATION_STEP + 1, 0]
     if times[place] > last_row[0] > times[place - 1]:
         late = (_INVERSE_VANDERMONDE_MATRIX @ (times - last_row[0])).tolist()
         sides = (place - 1.0) / HALF_SAMPLES - 1.0, place / HALF_SAMPLES - 1.0
         if _evaluate_polynomial(sides[0], late) < 0.0 < _evaluate_polynomial(sides[1], late):
             part = HALF_SAMPLES * (1.0 + brentq(_evaluate_polynomial, *sides, args=(late,)))
-    within = part / SAMPLES_PER_STEP * _SAMPLE_INDICES[1:-1]
-    step = recorded_rows[begin + 1 : begin + SAMPLES_PER_STEP + 1]
+    within = part / SAMPLES_PER_INTEGRATION_STEP * _SAMPLE_INDICES[1:-1]
+    step = recorded_rows[begin + 1 : begin + SAMPLES_PER_INTEGRATION_STEP + 1]
     step[:-1], step[-1] = (
         _compute_interpolation_weights(within).T
-        @ recorded_rows[begin : begin + SAMPLES_PER_STEP + 1],
+        @ recorded_rows[begin : begin + SAMPLES_PER_INTEGRATION_STEP + 1],
         last_row,
     )
     step[:, REGIME_COLUMN], step[:, SAMPLE_NUMBER_COLUMN] = (
         last_row[REGIME_COLUMN],
         _SAMPLE_INDICES[1:],
     )
-    return recorded_rows[: begin + SAMPLES_PER_STEP + 1]
+    return recorded_rows[: begin + SAMPLES_PER_INTEGRATION_STEP + 1]
 
 
 def resample_along_path(  # type: ignore[no-untyped-def]
@@ -471,24 +471,27 @@ def find_fractional_row_of_extremum(
         extreme_row + 1,
     ):  # The row belongs to the first step, and the second step may begin at the row.
         begin = after - int(step_sample_numbers[after]) if after < len(column_values) else after
-        if begin == after or begin + SAMPLES_PER_STEP >= len(column_values):
+        if begin == after or begin + SAMPLES_PER_INTEGRATION_STEP >= len(column_values):
             continue
-        for power in range(SAMPLES_PER_STEP + 1):
+        for power in range(SAMPLES_PER_INTEGRATION_STEP + 1):
             work_array[power] = 0.0
-            for k in range(SAMPLES_PER_STEP + 1):
+            for k in range(SAMPLES_PER_INTEGRATION_STEP + 1):
                 work_array[power] += SAMPLE_INTERPOLATION_COEFFICIENTS[power][k] * (
                     column_values[begin + k] - column_values[extreme_row]
                 )
         at = (extreme_row - begin) / HALF_SAMPLES - 1.0
         for _ in range(4):
             slope = bend = 0.0
-            for power in range(SAMPLES_PER_STEP, 1, -1):
+            for power in range(SAMPLES_PER_INTEGRATION_STEP, 1, -1):
                 slope = slope * at + power * work_array[power]
                 bend = bend * at + power * (power - 1) * work_array[power]
             slope = slope * at + work_array[1]
             at -= slope / bend if bend != 0.0 else 0.0
         place = HALF_SAMPLES * (1.0 + at)
-        if abs(place - (extreme_row - begin)) < 1.0 and 0.0 <= place <= SAMPLES_PER_STEP:
+        if (
+            abs(place - (extreme_row - begin)) < 1.0
+            and 0.0 <= place <= SAMPLES_PER_INTEGRATION_STEP
+        ):
             return begin + place
     return float(extreme_row)
 
@@ -532,9 +535,12 @@ def interpolate_at_fractional_rows(
 #: Coefficients of the interpolation within a step. The variable of the polynomial is -1 at the
 #: beginning of the step and 1 at its end. ``SAMPLE_INTERPOLATION_COEFFICIENTS[power][k]`` is the
 #: contribution of sample ``k`` to the coefficient of ``power``.
-HALF_SAMPLES, _SAMPLE_INDICES = 0.5 * SAMPLES_PER_STEP, np.arange(SAMPLES_PER_STEP + 1)
+HALF_SAMPLES, _SAMPLE_INDICES = (
+    0.5 * SAMPLES_PER_INTEGRATION_STEP,
+    np.arange(SAMPLES_PER_INTEGRATION_STEP + 1),
+)
 _INVERSE_VANDERMONDE_MATRIX = np.linalg.inv(
-    np.vander(np.linspace(-1.0, 1.0, SAMPLES_PER_STEP + 1), increasing=True)
+    np.vander(np.linspace(-1.0, 1.0, SAMPLES_PER_INTEGRATION_STEP + 1), increasing=True)
 )
 SAMPLE_INTERPOLATION_COEFFICIENTS = tuple(
     tuple(row) for row in _INVERSE_VANDERMONDE_MATRIX.tolist()

@@ -16,8 +16,8 @@ from rsfstudy.motion.array_layout import (
     SPRING_STRESS,
 )
 from rsfstudy.motion.array_operations import copy_values, evaluate_function_into_array
+from rsfstudy.motion.integration_steps import compute_slip_since_motion_start
 from rsfstudy.motion.regime_switching import can_start_on_slow_manifold
-from rsfstudy.motion.step_integration import compute_slip_since_motion_start
 from rsfstudy.parts import (
     BOUNDARY_PRESSURE_RATE,
     LAW,

@@ -12,10 +12,10 @@ from rsfstudy.status import Status
 
 #: Reference local tolerance for the maximum step size, which is proportional to the eighth root of
 #: the local tolerance.
-MAX_STEP_SCALING_REFERENCE_TOLERANCE = 1e-7
+REFERENCE_TOLERANCE_FOR_MAX_STEP_LENGTH = 1e-7
 #: Minimum local tolerance. Below this tolerance, rounding errors dominate, and SciPy issues a
 #: warning.
-MIN_LOCAL_TOLERANCE = 5e-14
+MIN_LOCAL_ERROR_TOLERANCE = 5e-14
 
 
 class MotionStopped(RsfStudyError):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.plots._axes import (
+    from rsfstudy.plots._axis_formatting import (
         are_log_spaced,
         are_positive_and_span_decades,
         compute_cell_edges,
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         label_rows,
     )
     from rsfstudy.plots._figure_choice import FIGURE_NAMES
-    from rsfstudy.plots._figures import draw_figure, save_figure
+    from rsfstudy.plots._figure_drawing import draw_figure, save_figure
     from rsfstudy.plots._healing import plot_healing
     from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
     from rsfstudy.plots._motion import plot_motion
@@ -38,7 +38,7 @@ else:
         __name__,
         {
             "plots._reference_agreement": ("draw_agreement",),
-            "plots._axes": (
+            "plots._axis_formatting": (
                 "are_log_spaced",
                 "are_positive_and_span_decades",
                 "compute_cell_edges",
@@ -47,7 +47,7 @@ else:
                 "label_rows",
             ),
             "plots._figure_choice": ("FIGURE_NAMES",),
-            "plots._figures": ("draw_figure", "save_figure"),
+            "plots._figure_drawing": ("draw_figure", "save_figure"),
             "plots._healing": ("plot_healing",),
             "plots._image_files": ("Figure", "NotebookFigure", "render_figure", "write_image"),
             "plots._motion": ("plot_motion",),

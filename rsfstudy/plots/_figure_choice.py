@@ -13,7 +13,7 @@ import xarray as xr
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.plots import _panel
-from rsfstudy.plots._axes import describe_point
+from rsfstudy.plots._axis_formatting import describe_point
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Figure as Declared
@@ -59,7 +59,7 @@ def choose_figure_and_build_panels(
     if name == _NAME_OF_FITS_FIGURE and variable == "posterior" and variable in dataset:
         from rsfstudy.plots import corner_plots
 
-        return corner_plots.posterior_figure(dataset)
+        return corner_plots.build_posterior_corner_figure(dataset)
     if name == _NAME_OF_FITS_FIGURE and requested_figure is variable is None:
         return Declared(
             importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").build_fit_panels(
@@ -78,7 +78,10 @@ def choose_figure_and_build_panels(
         if isinstance(requested_figure, Declared) and not requested_figure.allow_extra_dims:
             known = set(study.dimensions)
     elif isinstance(requested_figure, Declared):
-        known -= set(StoredDataset(dataset).declaration.overrides) - requested_figure.dimensions
+        known -= (
+            set(StoredDataset(dataset).declaration.overrides)
+            - requested_figure.used_dimension_names
+        )
     varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
     further = sorted(varied - known)
     many = math.prod(sizes[dimension] for dimension in further) > _MAX_POINTS_OF_REPEATED_AXES
@@ -148,7 +151,7 @@ def _build_generic_figure(dataset: xr.Dataset, variable: str | None = None) -> D
     The figure is a corner plot for studies with samples, a set of maps if there are two numeric
     axes, and a line plot otherwise.
     """
-    from rsfstudy.plots import _axes, corner_plots, lines, maps
+    from rsfstudy.plots import _axis_formatting, corner_plots, lines, maps
 
     logarithms = [n for n in map(str, dataset.data_vars) if "log10_" in n]
     dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
@@ -158,7 +161,9 @@ def _build_generic_figure(dataset: xr.Dataset, variable: str | None = None) -> D
         if found := build_panels(dataset, variable):
             return Declared(found)
     choices = [
-        str(name) for name, values in dataset.data_vars.items() if _axes.is_numeric_variable(values)
+        str(name)
+        for name, values in dataset.data_vars.items()
+        if _axis_formatting.is_numeric_variable(values)
     ]
     raise InvalidValue(
         "variable", variable, "is not a numeric variable of these results", choices=choices

@@ -11,10 +11,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.fitting import Record
-from rsfstudy.plots._axes import set_log_scale
+from rsfstudy.plots._axis_formatting import set_log_scale
 from rsfstudy.plots._figure_size import (
     compute_figure_size_in_inches,
     limit_panel_column_count_to_width,
@@ -35,7 +35,7 @@ _PANEL_HEIGHT_MM, _MAX_DRAWN_ROWS = 60.0, 20_000
 _ERROR_BAR_HALF_LENGTH_IN_STDERRS = 2.0
 
 
-@partial(error_boundary, applies_to_internal_calls=True)
+@partial(raise_only_rsfstudy_errors, applies_to_internal_calls=True)
 def plot_healing(
     table: xr.Dataset, record: Record | None = None, *, style: Any = None, width: Any = None
 ) -> Figure:

@@ -17,9 +17,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rsfstudy._deprecation import accept_former_keyword_names
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.plots._axes import set_log_scale
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
+from rsfstudy.plots._axis_formatting import set_log_scale
 from rsfstudy.plots._figure_size import (
     compute_figure_size_in_inches,
     compute_max_header_line_characters,
@@ -52,7 +52,7 @@ _FRICTION_AXIS_LABEL = r"Friction coefficient, $\mu$"
 
 
 @accept_former_keyword_names
-@partial(error_boundary, applies_to_internal_calls=True)
+@partial(raise_only_rsfstudy_errors, applies_to_internal_calls=True)
 def plot_motion(
     motion: xr.Dataset,
     rig: Rig | None = None,

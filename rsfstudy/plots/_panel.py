@@ -17,7 +17,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.errors import DataError
-from rsfstudy.plots._axes import (
+from rsfstudy.plots._axis_formatting import (
     add_colour_bar_of_dimension,
     are_log_spaced,
     are_positive_and_span_decades,
@@ -252,13 +252,13 @@ def iterate_curves_and_styles(
         if shades is not None:
             style |= {"color": shades[number], "linestyle": "-"}
         if panel.hue[1:] and panel.hue[1] in several:
-            style |= _choose_style_of_second_hue_point(at[1])
+            style |= _choose_line_style_for_second_hue(at[1])
         style["label"] = _format_curve_label(panel, row, named[:1] if len(several) > 1 else named)
         own = panel.style
         yield row, style | dict(own(row) if callable(own) else own)
 
 
-def _choose_style_of_second_hue_point(point_number: int) -> dict[str, str]:
+def _choose_line_style_for_second_hue(point_number: int) -> dict[str, str]:
     """Return line and marker fill styles for a point of the second ``hue`` axis."""
     line, fill = _LINE_AND_FILL_STYLES_OF_SECOND_HUE[
         point_number % len(_LINE_AND_FILL_STYLES_OF_SECOND_HUE)
@@ -281,7 +281,7 @@ def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> 
         own = {} if callable(panel.style) else dict(panel.style)
         line = {"linestyle": "none"} if panel.markers_only else {}
         for number in range(panel_data.sizes[second] if not shades else 0):
-            style = {"marker": "o"} | _choose_style_of_second_hue_point(number) | own | line
+            style = {"marker": "o"} | _choose_line_style_for_second_hue(number) | own | line
             add_grey_legend_entry(
                 axes, describe_point(panel_data.isel({second: number}), second), style
             )

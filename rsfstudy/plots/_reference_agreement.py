@@ -17,11 +17,13 @@ from rsfstudy.plots._style import (
     increase_figure_height_for_legends,
 )
 
-CurvePoints = Sequence[tuple[float, float]]
+SequenceOfXYPairs = Sequence[tuple[float, float]]
 
 
 @accept_former_keyword_names
-def draw_agreement(digits: Mapping[str, CurvePoints], label: str, required_digits: float) -> Figure:
+def draw_agreement(
+    digits: Mapping[str, SequenceOfXYPairs], label: str, required_digits: float
+) -> Figure:
     """Draw the number of correct digits of each quantity.
 
     Parameters

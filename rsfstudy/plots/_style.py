@@ -27,8 +27,8 @@ from matplotlib.text import Text
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
 from rsfstudy._deprecation import accept_former_keyword_names
-from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue, RsfStudyError, shorten_text
+from rsfstudy.exception_conversion import check_regular_file
 from rsfstudy.plots._figure_size import figure_width_context
 from rsfstudy.plots._text_formatting import estimate_visible_character_count, wrap_text
 

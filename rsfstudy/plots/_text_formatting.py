@@ -38,7 +38,7 @@ _MATHTEXT_REPLACEMENTS_OF_SYMBOLS: tuple[tuple[str, str], ...] = (
 
 
 #: Short names of quantities for axis labels. The names in files are longer.
-_SHORT_AXIS_NAMES_OF_QUANTITIES = {
+_SHORT_AXIS_LABEL_BY_QUANTITY = {
     "a_over_b_minus_a": "",
     "critical_displacement": "critical displacement",
     "critical_velocity_ratio": "critical load point velocity",
@@ -186,7 +186,7 @@ def format_quantity_axis_label(quantity: Quantity, max_line_characters: int = 45
         Label in mathtext. If the quantity has neither units nor a symbol, the label contains the
         scale instead of units.
     """
-    words = _SHORT_AXIS_NAMES_OF_QUANTITIES.get(quantity.name, quantity.long_name.split(":")[0])
+    words = _SHORT_AXIS_LABEL_BY_QUANTITY.get(quantity.name, quantity.long_name.split(":")[0])
     text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", quantity.symbol)))
     units = (
         quantity.units

@@ -15,7 +15,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from rsfstudy.plots._axes import (
+from rsfstudy.plots._axis_formatting import (
     describe_point,
     has_numeric_points,
     is_numeric_variable,
@@ -134,7 +134,7 @@ def build_corner_figure(dataset: xr.Dataset, variable: str | None = None) -> Cor
     return CornerFigure(panels, len(names)) if panels else None
 
 
-def posterior_figure(dataset: xr.Dataset) -> tuple[CornerFigure, xr.Dataset]:
+def build_posterior_corner_figure(dataset: xr.Dataset) -> tuple[CornerFigure, xr.Dataset]:
     """Build the corner plot of the posterior draws of a fit.
 
     Parameters

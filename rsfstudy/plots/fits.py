@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rsfstudy.fitting import PARAMETERS, split_window_number
-from rsfstudy.plots._axes import MIN_FONT_SIZE, describe_point
+from rsfstudy.plots._axis_formatting import MIN_FONT_SIZE, describe_point
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_style
 from rsfstudy.study import Panel
 
@@ -27,7 +27,7 @@ from rsfstudy.study import Panel
 #: thinned, and maximum number of panels that show a record.
 _MAX_AUTOCORRELATION_LAGS, _MAX_DRAWN_RECORD_ROWS, _MAX_RECORD_PANELS = 40, 20_000, 4
 #: Largest margin beyond the ends of the record as a fraction of the total extent of the windows.
-_MARGIN_FRACTION_BESIDE_RECORD = 0.02
+_MAX_RECORD_MARGIN_OVER_WINDOW_EXTENT = 0.02
 #: Margin on both sides of the fitted windows as a fraction of the total extent of the windows, and
 #: width of the moving average of residuals as a fraction of a window.
 _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
@@ -35,7 +35,7 @@ _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 
 #: replaces the numbers in larger matrices.
 _MAX_PARAMETERS_WITH_CORRELATION_TEXT = 8
 #: Margin above and below the visible curves as a fraction of their range.
-_Y_MARGIN_FRACTION = 0.05
+_Y_MARGIN_OVER_CURVE_RANGE = 0.05
 #: Half width of the confidence band of the fitted curve, in standard errors.
 _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS = 2.0
 _LINE_STYLE_OF_RECORD_ROWS: dict[str, Any] = {
@@ -110,10 +110,10 @@ def _format_loading_step_title(dataset: xr.Dataset) -> str:
     """Return the title of the first step if there are several steps."""
     if "step" not in dataset.dims:
         return ""
-    return f"Step {dataset['step'].values[0]:g}{_count_of_steps(dataset)}"
+    return f"Step {dataset['step'].values[0]:g}{_format_step_count_in_parentheses(dataset)}"
 
 
-def _count_of_steps(dataset: xr.Dataset) -> str:
+def _format_step_count_in_parentheses(dataset: xr.Dataset) -> str:
     """Return the number of steps in parentheses if there are several steps."""
     return f" (of {dataset.sizes['step']})" if dataset.sizes.get("step", 1) > 1 else ""
 
@@ -188,7 +188,7 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
     if windows:
         beside = _MARGIN_FRACTION_BESIDE_WINDOWS * (max(windows) - min(windows))
         # The axis does not extend far beyond the ends of the record.
-        pad = _MARGIN_FRACTION_BESIDE_RECORD * (max(windows) - min(windows))
+        pad = _MAX_RECORD_MARGIN_OVER_WINDOW_EXTENT * (max(windows) - min(windows))
         axes.set_xlim(
             max(min(windows) - beside, float(np.min(record[0])) - pad),
             min(max(windows) + beside, float(np.max(record[0])) + pad),
@@ -207,7 +207,7 @@ def _set_y_limits_to_visible_lines(axes: Axes) -> None:
         x, y = np.asarray(line.get_data(), dtype=float)
         visible.append(y[(x >= left) & (x <= right) & np.isfinite(y)])
     values = np.concatenate(visible)
-    margin = _Y_MARGIN_FRACTION * (float(np.ptp(values)) or 1.0)
+    margin = _Y_MARGIN_OVER_CURVE_RANGE * (float(np.ptp(values)) or 1.0)
     axes.set_ylim(values.min() - margin, values.max() + margin)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.plots._axes import (
+from rsfstudy.plots._axis_formatting import (
     add_colour_bar_of_dimension,
     are_log_spaced,
     are_positive_and_span_decades,

@@ -23,7 +23,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, MaxNLocator
 from scipy.spatial import cKDTree
 
-from rsfstudy.plots._axes import (
+from rsfstudy.plots._axis_formatting import (
     MIN_FONT_SIZE,
     add_colour_bar_of_variable,
     are_log_spaced,
@@ -32,7 +32,7 @@ from rsfstudy.plots._axes import (
     format_axis_label,
     has_numeric_points,
     is_numeric_variable,
-    list_measured_variables,
+    list_numeric_result_variables,
     read_flag_meanings_of_variable,
 )
 from rsfstudy.plots._text_formatting import convert_symbols_to_mathtext, format_number
@@ -45,9 +45,9 @@ _MIN_POINTS_PER_MAP_AXIS, _MAX_MAPS = 3, 12
 _HATCH_PATTERNS_OF_STATUSES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
 #: Minimum distance of a contour label from the frame of the panel and from other contours, as a
 #: fraction of the panel size.
-_MIN_DISTANCE_AROUND_CONTOUR_LABEL = 0.06
+_MIN_CONTOUR_LABEL_GAP_OVER_PANEL_SIZE = 0.06
 #: Minimum extent of labelled contours, as a fraction of the panel size.
-_MIN_LENGTH_OF_LABELLED_CONTOUR = 0.2
+_MIN_LABELLED_CONTOUR_OVER_PANEL_SIZE = 0.2
 #: If an axis has fewer points than this number, contours are not drawn.
 _MIN_AXIS_POINTS_FOR_CONTOURS = 6
 _STATUS_LABEL_BY_CODE = {int(status): status.label for status in Status}
@@ -70,7 +70,7 @@ def build_map_panels(dataset: xr.Dataset, variable: str | None = None) -> Sequen
         One map per point of the other axes, for at most 12 points. The list is empty if the dataset
         does not contain the variable, or if the variable does not have two numeric dimensions.
     """
-    names = list_measured_variables(dataset)[:1] if variable is None else [variable]
+    names = list_numeric_result_variables(dataset)[:1] if variable is None else [variable]
     if not names or names[0] not in dataset:
         return []
     values = dataset[names[0]]
@@ -243,8 +243,8 @@ def _choose_contour_label_positions(
         apart = cKDTree(np.concatenate(others)).query(line)[0] if others else np.ones(len(line))
         room = np.minimum(apart, np.minimum(line, 1.0 - line).min(axis=1))
         if (
-            room.max() > _MIN_DISTANCE_AROUND_CONTOUR_LABEL
-            and np.ptp(line, axis=0).max() > _MIN_LENGTH_OF_LABELLED_CONTOUR
+            room.max() > _MIN_CONTOUR_LABEL_GAP_OVER_PANEL_SIZE
+            and np.ptp(line, axis=0).max() > _MIN_LABELLED_CONTOUR_OVER_PANEL_SIZE
         ):
             x, y = panel.inverted().transform(line[room.argmax()]).tolist()
             places.append((x, y))

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
         compare_file_with_known_answer,
         summarise_answer_comparisons,
     )
-    from rsfstudy.referee.problem_files import write_shipped_problems
+    from rsfstudy.referee.benchmark_problem_files import write_shipped_problems
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "referee.answer_comparison": ("AnswerComparison",),
-            "referee.problem_files": ("write_shipped_problems",),
+            "referee.benchmark_problem_files": ("write_shipped_problems",),
             "referee.answer_file_comparison": (
                 "compare_file_with_known_answer",
                 "summarise_answer_comparisons",

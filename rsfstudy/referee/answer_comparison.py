@@ -17,9 +17,9 @@ import numpy as np
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.referee import reference_answers
+from rsfstudy.referee.benchmark_problem_files import BenchmarkProblem
 from rsfstudy.referee.external_answers import ReportedQuantity
-from rsfstudy.referee.problem_files import BenchmarkProblem
-from rsfstudy.referee.reference_answers import AnswerColumnByQuantity
+from rsfstudy.referee.reference_answers import AnswerValuesByQuantity
 from rsfstudy.rig import read_table
 
 #: Default number of correct digits that an answer needs to pass.
@@ -36,7 +36,7 @@ _MAX_DIFFERENCE_IN_LAST_PLACE_UNITS = 1.51
 #: by the largest known value of the quantity.
 _QUANTITIES_STARTING_AT_ZERO = ("slip", "pore_pressure")
 #: Conventions for radiation damping, and the factors by which eta is multiplied.
-_DAMPING_FACTOR_BY_CONVENTION = {
+_DAMPING_MULTIPLIER_BY_CONVENTION = {
     "twice as large (G/c_s instead of G/(2 c_s))": 2.0,
     "half as large": 0.5,
     "left out": 0.0,
@@ -94,7 +94,7 @@ class AnswerComparison:
 
     Parameters
     ----------
-    problem : BenchmarkProblem
+    benchmark_problem : BenchmarkProblem
         Problem that both answers belong to.
     quantity_agreements : tuple of QuantityAgreement
         Agreement of each quantity.
@@ -105,7 +105,7 @@ class AnswerComparison:
         answer passes or if no explanation was found.
     """
 
-    problem: BenchmarkProblem
+    benchmark_problem: BenchmarkProblem
     quantity_agreements: tuple[QuantityAgreement, ...]
     required_digits: float
     explanation_of_disagreement: str = ""
@@ -121,7 +121,7 @@ class AnswerComparison:
 
         If the known answer has fewer digits than required, all known digits must be correct.
         """
-        return self.agreeing_digits >= min(self.required_digits, self.problem.digits)
+        return self.agreeing_digits >= min(self.required_digits, self.benchmark_problem.digits)
 
     def describe_agreements(self) -> list[str]:
         """Describe the agreement of each quantity.
@@ -132,7 +132,7 @@ class AnswerComparison:
             One line per quantity. Each line contains the number of correct digits, the row with the
             largest difference, and the first row with fewer correct digits than required.
         """
-        problem, lines = self.problem, []
+        problem, lines = self.benchmark_problem, []
         for agreement in self.quantity_agreements:
             text = (
                 f"  {agreement.quantity_name:20s} "
@@ -145,18 +145,18 @@ class AnswerComparison:
             elif problem.answer_index_column_name:
                 text += (
                     ", lowest agreement at "
-                    f"{_format_index_value_of_row(problem, agreement.least_agreeing_row)}"
+                    f"{_format_time_or_peak_number_of_row(problem, agreement.least_agreeing_row)}"
                 )
             if agreement.first_failing_row is not None and problem.answer_index_column_name:
                 text += (
                     "; fewer digits than required from "
-                    f"{_format_index_value_of_row(problem, agreement.first_failing_row)}"
+                    f"{_format_time_or_peak_number_of_row(problem, agreement.first_failing_row)}"
                 )
             lines.append(text)
         return lines
 
 
-def _format_index_value_of_row(problem: BenchmarkProblem, row: int) -> str:
+def _format_time_or_peak_number_of_row(problem: BenchmarkProblem, row: int) -> str:
     """Format the value in the index column of a row, with units."""
     units = {"time": " s"}.get(problem.answer_index_column_name, "")
     return f"{problem.answer_index_column_name} = {problem.answer_index_values[row]:g}{units}"
@@ -164,7 +164,7 @@ def _format_index_value_of_row(problem: BenchmarkProblem, row: int) -> str:
 
 def read_or_compute_known_answer(
     problem: BenchmarkProblem, answer_path: Path | None
-) -> tuple[BenchmarkProblem, AnswerColumnByQuantity]:
+) -> tuple[BenchmarkProblem, AnswerValuesByQuantity]:
     """Return a problem and its known answer.
 
     Parameters
@@ -194,7 +194,8 @@ def read_or_compute_known_answer(
     engine = Engine.COMPILED if Engine.is_installed(Engine.COMPILED) else Engine.SCIPY
     rough, fine = (
         reference_answers.compute_answer(
-            problem, Accuracy(tolerance, reference_answers.ANSWER_EVALUATION_BUDGET, engine=engine)
+            problem,
+            Accuracy(tolerance, reference_answers.MAX_RHS_EVALUATIONS_PER_ANSWER, engine=engine),
         )
         for tolerance in _REFERENCE_RTOLS
     )
@@ -204,7 +205,7 @@ def read_or_compute_known_answer(
 
 def compare_answers(
     problem: BenchmarkProblem,
-    known_answer: AnswerColumnByQuantity,
+    known_answer: AnswerValuesByQuantity,
     reported_quantities: Mapping[str, ReportedQuantity],
     required_digits: float,
 ) -> AnswerComparison:
@@ -283,8 +284,8 @@ def round_digit_count_down(digit_count: float) -> float:
 
 def _compare_quantities(
     problem: BenchmarkProblem,
-    reported_answer: AnswerColumnByQuantity,
-    known_answer: AnswerColumnByQuantity,
+    reported_answer: AnswerValuesByQuantity,
+    known_answer: AnswerValuesByQuantity,
     required_digits: float,
     last_place_unit_by_quantity: Mapping[str, float] | None = None,
 ) -> tuple[QuantityAgreement, ...]:
@@ -335,8 +336,8 @@ def _compute_relative_differences(
 
 def _iterate_explanations_of_disagreement(
     problem: BenchmarkProblem,
-    reported_answer: AnswerColumnByQuantity,
-    known_answer: AnswerColumnByQuantity,
+    reported_answer: AnswerValuesByQuantity,
+    known_answer: AnswerValuesByQuantity,
 ) -> Iterator[tuple[float, str]]:
     """Iterate over conventions that may explain an incorrect answer.
 
@@ -353,7 +354,7 @@ def _iterate_explanations_of_disagreement(
     for words, other in _iterate_problems_in_other_conventions(problem):
         try:
             table = reference_answers.compute_answer(
-                other, Accuracy(_EXPLANATION_RTOL, reference_answers.ANSWER_EVALUATION_BUDGET)
+                other, Accuracy(_EXPLANATION_RTOL, reference_answers.MAX_RHS_EVALUATIONS_PER_ANSWER)
             )
         except RsfStudyError:
             continue
@@ -367,9 +368,9 @@ def _iterate_explanations_of_disagreement(
 
 def _iterate_answers_in_other_conventions(
     problem: BenchmarkProblem,
-    reported_answer: AnswerColumnByQuantity,
-    known_answer: AnswerColumnByQuantity,
-) -> Iterator[tuple[str, AnswerColumnByQuantity]]:
+    reported_answer: AnswerValuesByQuantity,
+    known_answer: AnswerValuesByQuantity,
+) -> Iterator[tuple[str, AnswerValuesByQuantity]]:
     """Iterate over copies of an answer, converted from other conventions.
 
     Each item contains a description of a convention, and the columns of the converted answer.
@@ -450,7 +451,7 @@ def _iterate_problems_in_other_conventions(
         return replace(problem, parameters={**problem.parameters, **parameters})
 
     if problem.radiation_damping:
-        for words, factor in _DAMPING_FACTOR_BY_CONVENTION.items():
+        for words, factor in _DAMPING_MULTIPLIER_BY_CONVENTION.items():
             eta = f"{factor * problem.radiation_damping!r} Pa s/m"
             yield f"damping is {words}", changed(radiation_damping=eta)
     if problem.initial:

@@ -13,8 +13,8 @@ from rsfstudy.referee.answer_comparison import (
     compare_answers,
     read_or_compute_known_answer,
 )
+from rsfstudy.referee.benchmark_problem_files import find_shipped_problem_files, read_problem
 from rsfstudy.referee.external_answers import read_external_answer
-from rsfstudy.referee.problem_files import find_shipped_problem_files, read_problem
 
 
 def compare_file_with_known_answer(
@@ -89,11 +89,11 @@ def summarise_answer_comparisons(answer_comparisons: Sequence[AnswerComparison])
         Summary such as "9 problems of 24, 9 to 10 digits". Only problems that passed are counted.
     """
     passed = {
-        one.problem.title: math.floor(one.agreeing_digits)
+        one.benchmark_problem.title: math.floor(one.agreeing_digits)
         for one in answer_comparisons
         if one.has_required_digits
     }
-    own = all(one.problem.number == 0 for one in answer_comparisons)
+    own = all(one.benchmark_problem.number == 0 for one in answer_comparisons)
     kind = "user-defined problem" if own else "problem"
     text = format_count_with_noun(len(passed), kind) + (
         "" if own else f" of {len(find_shipped_problem_files())}"

@@ -16,16 +16,16 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.referee import reference_answers
-from rsfstudy.referee.problem_files import BenchmarkProblem
+from rsfstudy.referee.benchmark_problem_files import BenchmarkProblem
 from rsfstudy.rig import Column, convert_to_si, read_table
 
 #: Names and units of substitute quantities, keyed by requested quantities. A file may contain the
 #: substitute quantity instead of the requested quantity.
-_SUBSTITUTE_AND_UNITS_BY_QUANTITY = {
+_EQUIVALENT_AND_UNITS_BY_QUANTITY = {
     "slip_rate": ("log10_slip_rate", "1"),
     "friction": ("shear_stress", "Pa"),
 }
-_UNITS_BY_SUBSTITUTE_QUANTITY = dict(_SUBSTITUTE_AND_UNITS_BY_QUANTITY.values())
+_UNITS_BY_EQUIVALENT_QUANTITY = dict(_EQUIVALENT_AND_UNITS_BY_QUANTITY.values())
 #: Tolerance for comparing times, relative to the last time. The tolerance is necessary because
 #: times in files are rounded.
 _RTOL_FOR_MATCHING_ANSWER_TIMES = 1e-9
@@ -95,13 +95,13 @@ def read_external_answer(
             "number of rows", count, rule, remedy=remedy if problem.answer_index_column_name else ""
         )
         raise wrong.with_location(str(path))
-    asked = {*problem.answer_column_names, *_UNITS_BY_SUBSTITUTE_QUANTITY}
+    asked = {*problem.answer_column_names, *_UNITS_BY_EQUIVALENT_QUANTITY}
     found = {
         key: _convert_column_to_si(key, column, problem)
         for key, column in table.items()
         if key in asked
     }
-    for name, (other, _units) in _SUBSTITUTE_AND_UNITS_BY_QUANTITY.items():
+    for name, (other, _units) in _EQUIVALENT_AND_UNITS_BY_QUANTITY.items():
         # With radiation damping, the slip rate is required to convert shear stress to friction.
         waits = name == "friction" and problem.radiation_damping and "slip_rate" not in found
         if (
@@ -111,7 +111,7 @@ def read_external_answer(
             and not waits
         ):
             found[name] = ReportedQuantity(
-                _derive_quantity_from_substitute(name, problem, found), 0.0
+                _derive_from_reported_equivalent(name, problem, found), 0.0
             )
     for name in reversed(problem.answer_column_names):
         if name not in found:
@@ -122,7 +122,7 @@ def read_external_answer(
             wrong = InvalidValue("column", name, "is missing", choices=table, remedy=remedy)
             raise wrong.with_location(str(path))
     if problem.answer_index_column_name:
-        _check_index_values(
+        _check_times_or_peak_numbers(
             table[problem.answer_index_column_name],
             found[problem.answer_index_column_name].si_values,
             rows,
@@ -131,7 +131,7 @@ def read_external_answer(
     return {name: found[name] for name in problem.answer_column_names}
 
 
-def _derive_quantity_from_substitute(
+def _derive_from_reported_equivalent(
     quantity_name: str,
     problem: BenchmarkProblem,
     reported_quantities: Mapping[str, ReportedQuantity],
@@ -160,7 +160,7 @@ def _convert_column_to_si(
     """Convert a column to SI units."""
     units = (
         problem.si_units_by_quantity.get(quantity_name)
-        or _UNITS_BY_SUBSTITUTE_QUANTITY[quantity_name]
+        or _UNITS_BY_EQUIVALENT_QUANTITY[quantity_name]
     )
     one = "1" if column.units in ("", "1") else f"1 {column.units}"
     if units != "1" and one == "1":
@@ -195,7 +195,7 @@ def _find_last_place_unit(values: np.ndarray) -> float:
     return float(10.0 ** min(0, *map(int, exponents))) if exponents else 0.0
 
 
-def _check_index_values(
+def _check_times_or_peak_numbers(
     column: Column, values: np.ndarray, expected_values: np.ndarray, problem: BenchmarkProblem
 ) -> None:
     """Check that the index column has the values that the problem specifies.

@@ -11,15 +11,15 @@ import numpy as np
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
 from rsfstudy.motion import Accuracy, EventKind, Integrator, MotionRecorder, MotionStopped, maximum
-from rsfstudy.referee.problem_files import BenchmarkProblem
+from rsfstudy.referee.benchmark_problem_files import BenchmarkProblem
 from rsfstudy.status import Status
 
-AnswerColumnByQuantity = dict[str, np.ndarray]
+AnswerValuesByQuantity = dict[str, np.ndarray]
 #: Maximum number of evaluations of the right-hand side per answer.
-ANSWER_EVALUATION_BUDGET = 5_000_000
+MAX_RHS_EVALUATIONS_PER_ANSWER = 5_000_000
 
 
-def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColumnByQuantity:
+def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerValuesByQuantity:
     """Compute the answer to a benchmark problem.
 
     Parameters
@@ -66,10 +66,10 @@ def compute_effective_normal_stress_series(problem: BenchmarkProblem) -> np.ndar
         Effective normal stress in Pa.
     """
     asked = replace(problem, quantities=["normal_stress"])
-    return compute_answer(asked, Accuracy(1e-11, ANSWER_EVALUATION_BUDGET))["normal_stress"]
+    return compute_answer(asked, Accuracy(1e-11, MAX_RHS_EVALUATIONS_PER_ANSWER))["normal_stress"]
 
 
-def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColumnByQuantity:
+def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerValuesByQuantity:
     r"""Compute a time series at the times that the problem specifies.
 
     The state variables :math:`\Theta` of the simulated motion are converted to :math:`\theta =
@@ -84,7 +84,7 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
         scene,
         recording=recording,
         until=float(at[-1]),
-        resume_from=problem.initial_state_event,
+        resume_from=problem.initial_motion_state,
     )
     for _ in moving:
         pass
@@ -110,14 +110,14 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
 
 def _compute_times_and_slip_rates_of_peaks(
     problem: BenchmarkProblem, accuracy: Accuracy
-) -> AnswerColumnByQuantity:
+) -> AnswerValuesByQuantity:
     """Compute the times and values of slip rate maxima."""
     rig = problem.rig
     watched = Integrator(accuracy).follow(
         problem.scene,
         [maximum("log_slip_rate")],
         with_time=True,
-        resume_from=problem.initial_state_event,
+        resume_from=problem.initial_motion_state,
     )
     peaks = list(islice((e for e in watched if e.kind is EventKind.MAXIMUM), problem.count))
     return {
@@ -129,7 +129,7 @@ def _compute_times_and_slip_rates_of_peaks(
 
 def _compute_requested_scalar_quantities(
     problem: BenchmarkProblem, accuracy: Accuracy
-) -> AnswerColumnByQuantity:
+) -> AnswerValuesByQuantity:
     """Compute an answer that consists of single numbers."""
     told: dict[str, float] = {}
     for names, find in _COMPUTE_FUNCTION_BY_SCALAR_QUANTITIES.items():

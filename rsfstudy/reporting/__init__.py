@@ -19,14 +19,23 @@ if TYPE_CHECKING:
         format_notes_on_incomplete_results,
         format_status_counts,
     )
+    from rsfstudy.reporting.claim_verdict_tables import (
+        build_claims_table,
+        format_verdict_counts,
+        summarise_verdicts_and_failures,
+    )
+    from rsfstudy.reporting.dataset_origin_descriptions import (
+        describe_scene_and_rig_fields,
+        format_note_on_low_instability_norms,
+    )
     from rsfstudy.reporting.dataset_summaries import (
         SummaryTableOrSentence,
         build_motion_tables_and_sentences,
         build_summary_tables_and_sentences,
         describe_dataset_origin,
-        is_motion,
+        is_motion_dataset,
     )
-    from rsfstudy.reporting.event_tables import (
+    from rsfstudy.reporting.event_catalogue_tables import (
         build_record_events_tables_and_sentences,
         summarise_events_as_json_fields,
     )
@@ -48,21 +57,12 @@ if TYPE_CHECKING:
     from rsfstudy.reporting.lattice_tables import (
         summarise_study_as_text_lines,
     )
-    from rsfstudy.reporting.origin_descriptions import (
-        describe_scene_and_rig_fields,
-        describe_slow_instability_norms,
-    )
     from rsfstudy.reporting.reduction_tables import (
         build_reduction_tables_and_sentences,
     )
     from rsfstudy.reporting.text_tables import (
         TextTable,
         format_number_or_dash,
-    )
-    from rsfstudy.reporting.verdict_tables import (
-        build_claims_table,
-        format_verdict_counts,
-        summarise_verdicts_and_failures,
     )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -76,7 +76,7 @@ else:
                 "format_notes_on_incomplete_results",
                 "format_status_counts",
             ),
-            "reporting.event_tables": (
+            "reporting.event_catalogue_tables": (
                 "build_record_events_tables_and_sentences",
                 "summarise_events_as_json_fields",
             ),
@@ -96,9 +96,9 @@ else:
                 "summarise_file_as_json_fields",
                 "summarise_study_as_json_fields",
             ),
-            "reporting.origin_descriptions": (
+            "reporting.dataset_origin_descriptions": (
                 "describe_scene_and_rig_fields",
-                "describe_slow_instability_norms",
+                "format_note_on_low_instability_norms",
             ),
             "reporting.reduction_tables": ("build_reduction_tables_and_sentences",),
             "reporting.dataset_summaries": (
@@ -106,13 +106,13 @@ else:
                 "build_motion_tables_and_sentences",
                 "build_summary_tables_and_sentences",
                 "describe_dataset_origin",
-                "is_motion",
+                "is_motion_dataset",
             ),
             "reporting.text_tables": (
                 "TextTable",
                 "format_number_or_dash",
             ),
-            "reporting.verdict_tables": (
+            "reporting.claim_verdict_tables": (
                 "build_claims_table",
                 "format_verdict_counts",
                 "summarise_verdicts_and_failures",
@@ -146,9 +146,9 @@ __all__ = [
     "format_value_with_stderr",
     "contains_fits",
     "is_hold_table",
-    "is_motion",
+    "is_motion_dataset",
     "summarise_fits_as_json_fields",
-    "describe_slow_instability_norms",
+    "format_note_on_low_instability_norms",
     "split_into_single_fits",
     "summarise_file_as_json_fields",
     "summarise_holds",

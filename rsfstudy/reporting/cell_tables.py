@@ -12,8 +12,8 @@ import xarray as xr
 
 from rsfstudy.formatting import format_count_with_noun, format_fields_except_none
 from rsfstudy.reporting.reduction_tables import (
+    describe_missing_reduction_results,
     find_reasons_of_refused_reductions,
-    format_missing_results,
 )
 from rsfstudy.reporting.text_tables import TextTable
 from rsfstudy.status import Status
@@ -114,7 +114,9 @@ def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
         Notes for the user. The list is empty if no cell failed and all reductions have results.
     """
     reasons = find_reasons_of_refused_reductions(results)
-    told = [": ".join(note) for note in format_missing_results(results, reasons).items()]
+    told = [
+        ": ".join(note) for note in describe_missing_reduction_results(results, reasons).items()
+    ]
     if failed := count_failed_cells_by_status(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"

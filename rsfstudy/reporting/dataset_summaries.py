@@ -15,13 +15,13 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import EVENT_QUANTITIES
 from rsfstudy.formatting import read_flag_meanings
-from rsfstudy.reporting import fit_tables, origin_descriptions
+from rsfstudy.reporting import dataset_origin_descriptions, fit_tables
 from rsfstudy.reporting.fit_summaries import summarise_fits
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
 from rsfstudy.reporting.reduction_tables import (
     build_reduction_tables,
+    describe_missing_reduction_results,
     find_reasons_of_refused_reductions,
-    format_missing_results,
 )
 from rsfstudy.reporting.text_tables import (
     MAX_ROWS_IN_THINNED_TABLE,
@@ -56,13 +56,17 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
     elif not StoredDataset(dataset).is_of_single_scene:
         yield build_primary_output_table(dataset)
         yield from build_reduction_tables(dataset)
-        yield format_missing_results(dataset, find_reasons_of_refused_reductions(dataset))
-        yield from filter(None, [origin_descriptions.describe_slow_instability_norms(dataset)])
-    elif is_motion(dataset):
+        yield describe_missing_reduction_results(
+            dataset, find_reasons_of_refused_reductions(dataset)
+        )
+        yield from filter(
+            None, [dataset_origin_descriptions.format_note_on_low_instability_norms(dataset)]
+        )
+    elif is_motion_dataset(dataset):
         yield summarise_motion(dataset)
         try:
             yield describe_stability(dataset.rsf.scene)
-            yield from describe_friction_if_default(dataset.rsf.scene)
+            yield from format_notes_on_default_mu_star(dataset.rsf.scene)
             yield build_events_table(dataset.rsf.events())
         except InvalidValue as error:  # The scene has a user-defined part.
             yield f"stability and events are unavailable: {error}"
@@ -90,11 +94,11 @@ def build_motion_tables_and_sentences(
         Peak values of the motion, stability of the scene, a note if the reference friction has its
         default value, and table of the events.
     """
-    notes = [describe_stability(scene), *describe_friction_if_default(scene)]
+    notes = [describe_stability(scene), *format_notes_on_default_mu_star(scene)]
     return [summarise_motion(motion), *notes, build_events_table(event_catalogue)]
 
 
-def is_motion(dataset: xr.Dataset) -> bool:
+def is_motion_dataset(dataset: xr.Dataset) -> bool:
     """Return True if a dataset is a motion, or a selection of times of a motion.
 
     Parameters
@@ -125,12 +129,12 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
         Descriptions of the scene or the lattice, the command, the versions and the status.
     """
     if not StoredDataset(dataset).is_of_single_scene:
-        return origin_descriptions.describe_study_origin(dataset)
+        return dataset_origin_descriptions.describe_study_origin(dataset)
     about, scene = dataset.attrs, StoredDataset(dataset).scene_fields
     fields = {n: v for n, v in scene.items() if n not in ("segments", "samples")}
     rig = StoredDataset(dataset).read_json_attribute("laboratory") if "laboratory" in about else {}
     return {
-        **origin_descriptions.describe_scene_and_rig_fields("scene", fields, rig),
+        **dataset_origin_descriptions.describe_scene_and_rig_fields("scene", fields, rig),
         "command": about.get("history", "unknown"),
         "software versions": about.get("source", "unknown"),
         "status": f"{about['status']} {about.get('message', '')}".strip(),
@@ -214,7 +218,7 @@ def describe_stability(scene: Scene) -> str:
     return f"stiffness is {ratio}: steady sliding at V_* is {sliding}"
 
 
-def describe_friction_if_default(scene: Scene) -> list[str]:
+def format_notes_on_default_mu_star(scene: Scene) -> list[str]:
     """Return a note if the friction coefficient at V_* has its default value.
 
     Parameters
@@ -227,7 +231,7 @@ def describe_friction_if_default(scene: Scene) -> list[str]:
     list of str
         Note, or an empty list if the friction coefficient differs from the default.
     """
-    default = SceneFields.collect_defaults()["mu_star"]
+    default = SceneFields.map_field_names_to_defaults()["mu_star"]
     if scene.mu_star != default:
         return []
     return [f"mu_star, the friction coefficient at V_*, has its default value {default:g}"]

@@ -30,7 +30,7 @@ _LABORATORY_NOTATION_BY_PARAMETER = {
     "trend1": "trend",
 }
 #: Labels of the statuses of fits that have values and valid standard errors.
-_STATUS_LABELS_OF_FITS_WITH_VALUES = (Status.OK.label, Status.NOT_IDENTIFIED.label)
+_STATUS_LABELS_OF_VALID_FITS = (Status.OK.label, Status.NOT_IDENTIFIED.label)
 
 
 def contains_fits(dataset: xr.Dataset) -> bool:
@@ -121,7 +121,7 @@ def find_parameter_headings(fit: xr.Dataset) -> dict[str, str]:
     return found
 
 
-def scene_fields_set_by_fit(dataset: xr.Dataset) -> set[str]:
+def list_scene_fields_set_by_fit(dataset: xr.Dataset) -> set[str]:
     """Return the names of the scene fields determined by a fit or by its record.
 
     The declaration of a fit contains only the initial values of these fields.
@@ -337,6 +337,6 @@ def are_all_fits_valid(dataset: xr.Dataset) -> bool:
         If the dataset contains no fits.
     """
     return all(
-        find_status_label_of_fit(one) in _STATUS_LABELS_OF_FITS_WITH_VALUES
+        find_status_label_of_fit(one) in _STATUS_LABELS_OF_VALID_FITS
         for one in split_into_single_fits(dataset)
     )

@@ -16,10 +16,13 @@ from rsfstudy.reporting.cell_tables import (
     count_cells_by_status,
     count_pending_cells,
 )
-from rsfstudy.reporting.dataset_summaries import compute_duration_and_peaks_of_motion, is_motion
+from rsfstudy.reporting.dataset_origin_descriptions import find_constant_scene_and_rig_fields
+from rsfstudy.reporting.dataset_summaries import (
+    compute_duration_and_peaks_of_motion,
+    is_motion_dataset,
+)
 from rsfstudy.reporting.fit_tables import contains_fits, summarise_fits_as_json_fields
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
-from rsfstudy.reporting.origin_descriptions import find_constant_fields
 from rsfstudy.reporting.reduction_tables import (
     build_reduction_tables,
     find_reasons_of_missing_reductions,
@@ -80,7 +83,7 @@ def classify_file_contents(dataset: xr.Dataset) -> str:
         return "fit"
     if not StoredDataset(dataset).is_of_single_scene:
         return "results"
-    return "motion" if is_motion(dataset) else "scene"
+    return "motion" if is_motion_dataset(dataset) else "scene"
 
 
 def summarise_file_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
@@ -115,7 +118,7 @@ def summarise_file_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, A
 def _summarise_results_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     """Summarise the results and the provenance of a study."""
     about, sizes = StoredDataset(dataset).provenance, dataset.sizes
-    scene, rig = find_constant_fields(dataset)
+    scene, rig = find_constant_scene_and_rig_fields(dataset)
     return summarise_study_as_json_fields(dataset, file) | {
         "lattice": {str(dimension): sizes[dimension] for dimension in dataset["status"].dims},
         "scene": _omit_fields_with_value_none(scene),

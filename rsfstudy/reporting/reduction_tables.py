@@ -124,7 +124,9 @@ def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTa
     """
     yield from build_reduction_tables(dataset)
     reasons = find_reasons_of_missing_reductions(dataset)
-    yield from (": ".join(note) for note in format_missing_results(dataset, reasons).items())
+    yield from (
+        ": ".join(note) for note in describe_missing_reduction_results(dataset, reasons).items()
+    )
 
 
 def find_reasons_of_refused_reductions(dataset: xr.Dataset) -> dict[str, str]:
@@ -151,7 +153,9 @@ def find_reasons_of_refused_reductions(dataset: xr.Dataset) -> dict[str, str]:
     return found
 
 
-def format_missing_results(dataset: xr.Dataset, reasons: Mapping[str, str]) -> dict[str, str]:
+def describe_missing_reduction_results(
+    dataset: xr.Dataset, reasons: Mapping[str, str]
+) -> dict[str, str]:
     """Describe the missing results of reductions.
 
     Parameters
@@ -178,7 +182,7 @@ def format_missing_results(dataset: xr.Dataset, reasons: Mapping[str, str]) -> d
         missing = values.isnull()
         if 0 < (count := int(missing.sum())) < values.size:
             points = [
-                _format_point(values, at.tolist())
+                _format_point_coordinates(values, at.tolist())
                 for at in np.argwhere(missing.values)[:_MAX_MISSING_POINTS_SHOWN]
             ]
             points += ["..."] * (count > len(points))
@@ -189,7 +193,7 @@ def format_missing_results(dataset: xr.Dataset, reasons: Mapping[str, str]) -> d
     return notes
 
 
-def _format_point(values: xr.DataArray, indices: Sequence[int]) -> str:
+def _format_point_coordinates(values: xr.DataArray, indices: Sequence[int]) -> str:
     """Format the coordinates that locate a value in an array."""
     point = values.isel(dict(zip(values.dims, indices, strict=True)))
     return ", ".join(f"{d} = {format_number_or_text(point[d].item())}" for d in values.dims)

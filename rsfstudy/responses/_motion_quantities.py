@@ -18,7 +18,7 @@ MIN_SQUARED_DIRECTION_COSINE_OF_PATH = 1e-12
 
 
 def compute_distance_from_steady_sliding(
-    scene: Scene, point: MotionPoint, load_velocity: float
+    scene: Scene, motion_point: MotionPoint, load_velocity: float
 ) -> float:
     """Compute the distance of a point from steady sliding at a load point velocity.
 
@@ -26,7 +26,7 @@ def compute_distance_from_steady_sliding(
     ----------
     scene : Scene
         Scene of the motion.
-    point : MotionPoint
+    motion_point : MotionPoint
         Point of the motion.
     load_velocity : float
         Load point velocity in units of V_*.
@@ -38,14 +38,16 @@ def compute_distance_from_steady_sliding(
         steady sliding. The second number is the difference between the state and its value in
         steady sliding, in units of b.
     """
-    size = scene.a * scene.parts.law.state_change_per_log_rate_over_a
+    size = scene.a * scene.parts.law.steady_state_change_per_log_rate_over_a
     return max(
-        abs(point.log_slip_rate - math.log(abs(load_velocity))),
-        point.distance_from_steady_state / size,
+        abs(motion_point.log_slip_rate - math.log(abs(load_velocity))),
+        motion_point.distance_from_steady_state / size,
     )
 
 
-def compute_growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> float:
+def compute_log_slip_rate_slope_along_path(
+    scene: Scene, event: Event, load_velocity: float
+) -> float:
     """Compute the growth rate of ln V at an event with respect to path length.
 
     During a rupture, the independent variable is the path length computed with the inertial time.

@@ -34,7 +34,7 @@ class RecordedMotion(NamedTuple):
 
     Parameters
     ----------
-    segment_start_events : list of Event
+    events_at_segment_starts : list of Event
         Events at the beginning of the first recorded loading segment and of all later segments.
     friction_before_segments : list of float
         Friction coefficient immediately before the beginning of each segment. If the scene has
@@ -52,7 +52,7 @@ class RecordedMotion(NamedTuple):
         ``rsfstudy.motion.neglected_inertia_error``.
     """
 
-    segment_start_events: list[Event]
+    events_at_segment_starts: list[Event]
     friction_before_segments: list[float]
     peak_event: Event | None
     end_event: Event
@@ -62,7 +62,7 @@ class RecordedMotion(NamedTuple):
     @property
     def start_event(self) -> Event:
         """Event at the beginning of the record."""
-        return self.segment_start_events[0]
+        return self.events_at_segment_starts[0]
 
     def get_neglected_inertia_error_until(self, time: float) -> float:
         """Return the error of ln V that is caused by neglected inertia.
@@ -145,7 +145,7 @@ def record_motion_until_peak(
     except MotionStopped:
         if peak is None or not allow_early_stop:
             raise
-    rows, start = recording.as_table(scene), Integrator.point_before_start(scene)
+    rows, start = recording.as_table(scene), Integrator.compute_point_before_start(scene)
     slow = recording.get_or_add_regime_index(scene.dynamics.regime_name)
     neglected = estimate_neglected_inertia_error(scene, rows, slow, start.log_slip_rate)
     shown = rows[:, 0] >= begun[first_segment_index].time
@@ -162,7 +162,7 @@ def record_motion_until_peak(
     return RecordedMotion(begun[first_segment_index:], before, peak, event, rows, neglected)
 
 
-def compute_path_relative_to_start(
+def compute_motion_relative_to_start(
     start_event: Event, path_variables: Mapping[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
     """Return the quantities along a record relative to its beginning.

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
@@ -33,11 +33,11 @@ from rsfstudy.quantities import Output
 from rsfstudy.responses._motion_quantities import (
     choose_friction_quantity_for_events,
     compute_distance_from_steady_sliding,
-    compute_growth_rate_along_path,
+    compute_log_slip_rate_slope_along_path,
 )
 from rsfstudy.responses._recorded_motion import (
     RecordedMotion,
-    compute_path_relative_to_start,
+    compute_motion_relative_to_start,
     estimate_errors_at_instants,
     record_motion_until_peak,
 )
@@ -70,7 +70,7 @@ _HEALING_OUTPUTS = (
 )
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Healing(RecordingMeasure):
     r"""Relaxation and healing of friction due to the first hold in a loading.
@@ -214,7 +214,7 @@ class Healing(RecordingMeasure):
         history = scene.parts.loading.segments
         # Friction peaks when the slip rate passes the load point velocity. A change of ln V by 1
         # changes friction by a.
-        growth = compute_growth_rate_along_path(
+        growth = compute_log_slip_rate_slope_along_path(
             scene, first.peak_event, history[hold + 1].load_velocity
         )
         turning = 1.0 / (scene.a * growth) if growth else math.inf
@@ -223,7 +223,7 @@ class Healing(RecordingMeasure):
             values, first.get_neglected_inertia_error_until(first.peak_event.time)
         )
         neglected["relaxation"] = first.get_neglected_inertia_error_until(
-            first.segment_start_events[1].time
+            first.events_at_segment_starts[1].time
         )
         # The peak displacement depends on the growth rate of ln V at the peak. The error of the
         # growth rate rises earlier than the error of ln V, so the error at the end of the record is
@@ -262,13 +262,13 @@ class Healing(RecordingMeasure):
     ) -> dict[str, np.ndarray]:
         """Return the quantities recorded since the beginning of the hold, by phase."""
         path = resample_motion_along_path(
-            recorded_motion.recorded_rows, self.phases, MotionRecorder.VARIABLE_NAMES
+            recorded_motion.recorded_rows, self.phases, MotionRecorder.RECORDED_VARIABLE_NAMES
         )
         moved = MotionRecorder.compute_load_point_displacement(
             scene, np.column_stack([*path.values()])
         )
         return {
-            **compute_path_relative_to_start(recorded_motion.start_event, path),
+            **compute_motion_relative_to_start(recorded_motion.start_event, path),
             "load_point_displacement": moved - moved[0],
         }
 
@@ -346,7 +346,7 @@ def _read_healing_values(
     """Return healing, relaxation and the peak displacement."""
     (before, held), reload = (
         recorded_motion.friction_before_segments[:2],
-        recorded_motion.segment_start_events[1],
+        recorded_motion.events_at_segment_starts[1],
     )
     longer = (peak_event.point.spring_stress - reload.point.spring_stress) / scene.stiffness
     return {

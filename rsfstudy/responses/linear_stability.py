@@ -14,7 +14,7 @@ from typing import ClassVar
 
 from scipy.optimize import brentq
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Integrator
 from rsfstudy.quantities import Output
@@ -31,7 +31,7 @@ from rsfstudy.status import Status
 #: stiffness by inertia exceeds this number.
 _MAX_CRITICAL_STIFFNESS_RISE_BY_INERTIA = 1e6
 
-_CRITICAL_STIFFNESS = Output(
+_CRITICAL_STIFFNESS_OUTPUT = Output(
     "critical_stiffness",
     r"$k_{cr}D_c/\sigma_*$",
     "1",
@@ -41,7 +41,7 @@ _CRITICAL_STIFFNESS = Output(
     error=True,
 )
 _STABILITY_OUTPUTS = (
-    _CRITICAL_STIFFNESS,
+    _CRITICAL_STIFFNESS_OUTPUT,
     Output("critical_stiffness_from_growth"),
     Output("critical_stiffness_explicit"),
     Output("relative_critical_stiffness"),
@@ -54,7 +54,7 @@ _STABILITY_OUTPUTS = (
 )
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class LinearStability(Measure):
     r"""Critical stiffness and growth rate at the load point velocity.
@@ -121,7 +121,7 @@ class LinearStability(Measure):
     """
 
     growth_rate: bool = False
-    fields_omitted_if_default: ClassVar[tuple[str, ...]] = ("growth_rate",)
+    fields_stored_unless_default: ClassVar[tuple[str, ...]] = ("growth_rate",)
     name: ClassVar[str] = "linear_stability"
     typical_work = 100
     needs_time: ClassVar[tuple[bool, ...]] = ()
@@ -138,7 +138,7 @@ class LinearStability(Measure):
             return _STABILITY_OUTPUTS
         return (
             *GROWTH_OUTPUTS,
-            replace(_CRITICAL_STIFFNESS, optional=True),
+            replace(_CRITICAL_STIFFNESS_OUTPUT, optional=True),
             *_STABILITY_OUTPUTS[1:],
         )
 
@@ -186,12 +186,12 @@ class LinearStability(Measure):
         return add_growth_rate(outcome, scene, steady, integrator) if self.growth_rate else outcome
 
     def _compute_critical_stiffness(
-        self, scene: Scene, steady: SteadySliding, integrator: Integrator
+        self, scene: Scene, steady_state: SteadySliding, integrator: Integrator
     ) -> Outcome:
         """Compute the critical stiffness from friction and from growth rates."""
-        load = steady.log_slip_rate
-        sigma_ss = scene.effective_normal_stress_at(steady.frictional_stress)
-        mu_ss = (scene.mu_star + steady.frictional_stress) / sigma_ss
+        load = steady_state.log_slip_rate
+        sigma_ss = scene.compute_effective_normal_stress(steady_state.frictional_stress)
+        mu_ss = (scene.mu_star + steady_state.frictional_stress) / sigma_ss
         values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
         massless = scene.critical_stiffness_at(load, quasi_static=True)
         critical = scene.critical_stiffness_at(load)
@@ -218,7 +218,7 @@ class LinearStability(Measure):
                 values,
                 f"at V T/(2 pi D_c) = {norm:.3g}, the direct effect cannot damp the oscillations",
             )
-        by_growth = _find_stiffness_at_zero_growth(scene, steady, critical, integrator)
+        by_growth = _find_stiffness_at_zero_growth(scene, steady_state, critical, integrator)
         if math.isnan(by_growth):
             why = (
                 "the growth rate of the linearised equations does not vanish at the stiffness "

@@ -53,7 +53,7 @@ GROWTH_OUTPUTS = (
 )
 
 
-def _needs_full_equations(scene: Scene, steady_state: SteadySliding) -> bool:
+def _needs_inertial_equations(scene: Scene, steady_state: SteadySliding) -> bool:
     """Return True if the slow manifold is too inaccurate at the given slip rate."""
     norm = scene.dynamics.compute_slip_rate_norm(scene, steady_state.log_slip_rate)
     return bool(norm > _MIN_SLIP_RATE_NORM_FOR_INERTIA)
@@ -81,7 +81,7 @@ def compute_jacobian_of_steady_sliding(
     ndarray, shape (n, n)
         Derivatives of the right-hand side (rows) with respect to the unknowns (columns).
     """
-    if _needs_full_equations(scene, steady_state):
+    if _needs_inertial_equations(scene, steady_state):
         equations = scene.equations_against_inertial_time()
         stress = steady_state.spring_stress
         state = (stress, steady_state.log_slip_rate, stress, *steady_state.states[1:])
@@ -123,7 +123,7 @@ def add_growth_rate(
     # load point displacement.
     found = found * (
         1.0 / scene.dynamics.compute_slip_rate_norm(scene, load)
-        if _needs_full_equations(scene, steady_state)
+        if _needs_inertial_equations(scene, steady_state)
         else 2.0
     )
     difference = float(abs(found - leading).min())

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base import Measure, Outcome, check_loading_has_no_noise
 from rsfstudy.motion import EventKind, Integrator, MotionRecorder, MotionStopped, fall, rise
 from rsfstudy.quantities import Output
@@ -59,7 +59,7 @@ _RIGID_RESPONSE_OUTPUTS = (
 )
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class RigidResponse(Measure):
     r"""Stress as a function of slip after a slip rate step of a rigid slider.
@@ -196,8 +196,8 @@ class RigidResponse(Measure):
         if abs(start - steady) < _MIN_FRICTION_CHANGE_AFTER_STEP_OVER_A * scene.a:
             return Outcome(Status.NOT_APPLICABLE, message="friction does not evolve after the step")
         level = steady + (start - steady) / math.e
-        distance, left, rows = self._integrate_stress_over_slip(scene, start, level, integrator)
-        again, _left, _rows = self._integrate_stress_over_slip(
+        distance, left, rows = self._compute_stress_along_slip(scene, start, level, integrator)
+        again, _left, _rows = self._compute_stress_along_slip(
             scene, start, level, integrator.refined()
         )
         # Derivative of the distance with respect to friction, for an exponential decay.
@@ -226,11 +226,11 @@ class RigidResponse(Measure):
             },
         )
 
-    def _integrate_stress_over_slip(
+    def _compute_stress_along_slip(
         self,
         scene: Scene,
         start_stress: float,
-        stress_level: float,
+        crossed_stress_level: float,
         integrator: Integrator,
     ) -> tuple[float, float, np.ndarray]:
         """Integrate the response of the slider over slip.
@@ -238,7 +238,7 @@ class RigidResponse(Measure):
         Returns
         -------
         distance : float
-            Slip at which the stress crosses ``stress_level``.
+            Slip at which the stress crosses ``crossed_stress_level``.
         stress_left : float
             Stress after a slip of D_c.
         rows : ndarray, shape (points, 3)
@@ -247,7 +247,10 @@ class RigidResponse(Measure):
         at, distance = self.inner_coordinates["slip"], math.nan
         recording = MotionRecorder(sample_times=np.union1d(at, [1.0]))
         equations = scene.equations_at_imposed_slip_rate(scene.log_load_velocity)
-        watches = (rise("frictional_stress", stress_level), fall("frictional_stress", stress_level))
+        watches = (
+            rise("frictional_stress", crossed_stress_level),
+            fall("frictional_stress", crossed_stress_level),
+        )
         # The step does not change the states Psi, which have their values of steady sliding at V_*.
         state = (start_stress, *scene.compute_steady_states(0.0, 0.0)[1:])
         complete = False
@@ -258,7 +261,7 @@ class RigidResponse(Measure):
             if complete and not math.isnan(distance):
                 break
         names = ("slip", "frictional_stress", "state_variable", "normal_stress_ratio")
-        columns = [MotionRecorder.VARIABLE_NAMES.index(name) for name in names]
+        columns = [MotionRecorder.RECORDED_VARIABLE_NAMES.index(name) for name in names]
         slips, *values = recording.as_table(scene)[:, columns].T
         values[0] = values[0] - scene.mu_star
         rows = np.stack(values, axis=1)
@@ -266,7 +269,7 @@ class RigidResponse(Measure):
 
 
 def _compute_misfit_to_closed_form(
-    scene: Scene, steady_state: float, slip: np.ndarray, stress: np.ndarray
+    scene: Scene, steady_stress: float, slip: np.ndarray, stress: np.ndarray
 ) -> float:
     r"""Compute the largest difference between stress and its closed form.
 
@@ -283,7 +286,7 @@ def _compute_misfit_to_closed_form(
     if stress_acts or parts.temperature.unknowns or law.relaxation is None:
         return math.nan
     left = np.array([law.relaxation(scene.log_load_velocity, at) for at in slip.tolist()])
-    exact = steady_state + (1.0 + scene.imposed_normal_stress) * scene.b * left
+    exact = steady_stress + (1.0 + scene.imposed_normal_stress) * scene.b * left
     return float(np.abs(stress - exact).max())
 
 
@@ -332,7 +335,7 @@ def compute_frictional_stress_after_step(scene: Scene, log_slip_rate: float) -> 
         With the status ``normal_stress_lost`` if a decrease of friction would open the fault, and
         with the status ``locked`` if no stress balances an increase of friction.
     """
-    friction = scene.frictional_stress_after_jump(scene.a * log_slip_rate)
+    friction = scene.frictional_stress_from_strength(scene.a * log_slip_rate)
     if friction is None and log_slip_rate < 0.0:
         raise MotionStopped(
             Status.NORMAL_STRESS_LOST, "the normal stress vanishes due to the direct effect"

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
@@ -51,7 +51,7 @@ _STEP_RESPONSE_OUTPUTS = (
 )
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class StepResponse(RecordingMeasure):
     """Peaks of slip rate after a step, and the path of the motion.
@@ -183,7 +183,7 @@ class StepResponse(RecordingMeasure):
                 "max_log10_slip_rate_error": integrator.estimate_error(
                     peaks.max(), again.max(), ERROR_FLOOR_OVER_RTOL
                 )
-                + _compute_error_of_neglected_initial_rise(scene, integrator),
+                + _compute_neglected_slip_rate_rise_error(scene, integrator),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
                 "peak_log10_slip_rate": log_slip_rates,
                 **resample_motion_along_path(rows, self.phases),
@@ -230,7 +230,7 @@ def _does_slip_rate_peak_at_start(scene: Scene, event: Event) -> bool:
     )
 
 
-def _compute_error_of_neglected_initial_rise(scene: Scene, integrator: Integrator) -> float:
+def _compute_neglected_slip_rate_rise_error(scene: Scene, integrator: Integrator) -> float:
     """Return the error of log10(V/V_*) caused by an initial rise of slip rate.
 
     The error is zero unless inertia delays the initial rise of slip rate.

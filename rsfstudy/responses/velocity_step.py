@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
@@ -36,7 +36,7 @@ from rsfstudy.responses._motion_quantities import (
 )
 from rsfstudy.responses._recorded_motion import (
     RecordedMotion,
-    compute_path_relative_to_start,
+    compute_motion_relative_to_start,
     compute_settled_friction_flag,
     estimate_errors_at_instants,
     record_motion_until_peak,
@@ -111,7 +111,7 @@ class _EvaluatedVelocityStep(NamedTuple):
         return math.log(self.velocity_after / self.velocity_before)
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class VelocityStep(RecordingMeasure):
     r"""Friction parameters read from the response to a velocity step.
@@ -272,7 +272,8 @@ class VelocityStep(RecordingMeasure):
         check_loading_changes_stress_only_in_steps(scene)
         step = self._find_evaluated_step(scene)
         records = [
-            self._record_response(scene, step, each) for each in (integrator, integrator.refined())
+            self._record_motion_and_read_results(scene, step, each)
+            for each in (integrator, integrator.refined())
         ]
         (record, values), (_again, again) = records
         slopes = self._compute_output_derivatives_by_friction(step.log_velocity_ratio, values)
@@ -312,7 +313,7 @@ class VelocityStep(RecordingMeasure):
         duration = min(own.duration, self.record / own.load_velocity)
         return _EvaluatedVelocityStep(before.load_velocity, own.load_velocity, start_time, duration)
 
-    def _record_response(
+    def _record_motion_and_read_results(
         self,
         scene: Scene,
         evaluated_step: _EvaluatedVelocityStep,
@@ -324,14 +325,14 @@ class VelocityStep(RecordingMeasure):
         turn = extreme(choose_friction_quantity_for_events(scene)[0])
         record = record_motion_until_peak(scene, integrator, [turn], number, number, end_time=end)
         return record, self._read_step_results(
-            evaluated_step, record, self._find_decay_event(scene, record, integrator)
+            evaluated_step, record, self._find_friction_decay_event(scene, record, integrator)
         )
 
     def _read_step_results(
         self,
         evaluated_step: _EvaluatedVelocityStep,
         recorded_motion: RecordedMotion,
-        decay_event: Event | None,
+        friction_decay_event: Event | None,
     ) -> dict[str, float]:
         """Return the results that are read from a record.
 
@@ -350,16 +351,18 @@ class VelocityStep(RecordingMeasure):
             "apparent_a": (top - before) / evaluated_step.log_velocity_ratio,
             "apparent_b": (top - after) / evaluated_step.log_velocity_ratio,
             "apparent_a_minus_b": (after - before) / evaluated_step.log_velocity_ratio,
-            "apparent_slip_distance": evaluated_step.velocity_after * decay_event.time
-            if decay_event
+            "apparent_slip_distance": evaluated_step.velocity_after * friction_decay_event.time
+            if friction_decay_event
             else math.nan,
-            "corrected_slip_distance": decay_event.slip if decay_event else math.nan,
+            "corrected_slip_distance": friction_decay_event.slip
+            if friction_decay_event
+            else math.nan,
             "peak_friction": top,
             "friction_before": before,
             "friction_after": after,
         }
 
-    def _find_decay_event(
+    def _find_friction_decay_event(
         self,
         scene: Scene,
         recorded_motion: RecordedMotion,
@@ -399,9 +402,9 @@ class VelocityStep(RecordingMeasure):
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
         turned = recorded_motion.peak_event or recorded_motion.end_event
         direct = turned.point.apparent_friction - recorded_motion.friction_before_segments[0]
-        path = compute_path_relative_to_start(
+        path = compute_motion_relative_to_start(
             recorded_motion.start_event,
-            resample_motion_along_path(rows, self.phases, MotionRecorder.VARIABLE_NAMES),
+            resample_motion_along_path(rows, self.phases, MotionRecorder.RECORDED_VARIABLE_NAMES),
         )
         stepped = scene.segment_scene(self.step_number - 1)
         is_flat = bool(np.ptp(last) < _SETTLING_TOLERANCE * abs(direct))

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
         RecordReadingOptions,
         read_columns,
     )
-    from rsfstudy.rig.common_headings import AcceptedRecordColumns, has_time_column
     from rsfstudy.rig.dataset_units import DatasetUnits
     from rsfstudy.rig.number_ranges import expand_range
     from rsfstudy.rig.protocol_files import read_protocol
+    from rsfstudy.rig.record_column_detection import AcceptedRecordColumns, has_time_column
     from rsfstudy.rig.record_files import read_record
     from rsfstudy.rig.rig import Rig
     from rsfstudy.rig.rig_scenes import (
@@ -58,7 +58,7 @@ else:
             "rig.table_columns": ("Column",),
             "rig.column_reading": ("ColumnsReadFromSource", "RecordReadingOptions", "read_columns"),
             "rig.table_files": ("read_table",),
-            "rig.common_headings": ("AcceptedRecordColumns", "has_time_column"),
+            "rig.record_column_detection": ("AcceptedRecordColumns", "has_time_column"),
             "rig.units": (
                 "convert_to_si",
                 "parse_number",

@@ -19,7 +19,7 @@ from rsfstudy.rig.rig_quantities import (
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
     RIG_QUANTITIES,
     RIG_QUANTITY_BY_AXIS_NAME,
-    SI_UNIT_BY_SCALE,
+    SI_UNIT_BY_DIMENSIONLESS_UNIT,
     find_si_units_of_scene_field,
     is_stiffness_in_friction_per_length,
 )
@@ -71,7 +71,7 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
         return Axis(dimension, values)
     if hasattr(values, "keys"):
         if isinstance(values, Mapping) and any(
-            isinstance(Axis.get_fields_of_point(point), Mapping) for point in values.values()
+            isinstance(Axis.point_fields_getter(point), Mapping) for point in values.values()
         ):
             return convert_axis_values_to_axis_units(Axis(dimension, values))
         units_by_name: Any = units or None
@@ -187,7 +187,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
         number, written = (
             split_number_and_units(value)
             if isinstance(value, str)
-            else (Axis.to_plain_value(quantity_name, value), units)
+            else (Axis.plain_value_converter(quantity_name, value), units)
         )
         if isinstance(number, float) and written == units:
             found.append(number)
@@ -196,7 +196,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     wrong = [
         value
         for number, value in zip(found, values, strict=True)
-        if not _is_positive_or_not_rig_quantity(quantity_name, number)
+        if not _is_positive_if_required(quantity_name, number)
     ]
     if wrong:
         of = f", but {len(wrong)} of {len(found)} values are not" if len(found) > 1 else ""
@@ -204,7 +204,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     return found
 
 
-def _is_positive_or_not_rig_quantity(quantity_name: str, number: Any) -> bool:
+def _is_positive_if_required(quantity_name: str, number: Any) -> bool:
     """Return False if a quantity that must be positive is not positive."""
     return quantity_name not in RIG_QUANTITY_BY_AXIS_NAME or (
         isinstance(number, float) and number > 0.0
@@ -255,7 +255,7 @@ def _find_si_units_of_axis_value(field_name: str, value: Any) -> str | None:
     if field_name in RIG_QUANTITY_BY_AXIS_NAME:
         return RIG_QUANTITIES[RIG_QUANTITY_BY_AXIS_NAME[field_name]].si_units
     if field_name in RATIO_FIELD_BY_DIMENSIONAL_NAME:
-        return SI_UNIT_BY_SCALE["V_*"]
+        return SI_UNIT_BY_DIMENSIONLESS_UNIT["V_*"]
     return find_si_units_of_scene_field(field_name, value)
 
 

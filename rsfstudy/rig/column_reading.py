@@ -12,13 +12,13 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 from rsfstudy.errors import CallError, InvalidValue, shorten_text
-from rsfstudy.rig.common_headings import (
+from rsfstudy.rig.readers import read_table_from_source
+from rsfstudy.rig.readers.tables_from_files_or_objects import LazyTable
+from rsfstudy.rig.record_column_detection import (
     AcceptedRecordColumns,
     check_column_values_are_finite,
     read_selected_and_detected_columns,
 )
-from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.table_sources import LazyTable
 from rsfstudy.rig.row_selection import RowSelection
 from rsfstudy.rig.table_columns import Column
 from rsfstudy.rig.units import (

@@ -37,9 +37,9 @@ _LOG_SLIP_RATE_DESCRIPTION_PATTERN = re.compile(r"^decimal logarithm of (the )?|
 #: the same name as the field.
 DIMENSIONLESS_PREFIX = "dimensionless_"
 #: Units of stress, length and time in tables and figures of rigs.
-DISPLAY_BASE_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
+DISPLAY_UNITS_OF_STRESS_LENGTH_TIME = {"stress": "MPa", "length": "um", "time": "s"}
 #: Name of the dataset attribute that lists the scales after a conversion.
-NAME_OF_SCALES_ATTRIBUTE = "scales"
+UNIT_SCALES_ATTRIBUTE_NAME = "scales"
 
 
 #: Relative tolerance for the comparison of two scales. The tolerance allows for rounding errors and
@@ -299,9 +299,11 @@ def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Results in MPa, um and s. A dataset without a rig is returned unchanged.
     """
-    if "sigma_star" not in dataset.variables or NAME_OF_SCALES_ATTRIBUTE in dataset.attrs:
+    if "sigma_star" not in dataset.variables or UNIT_SCALES_ATTRIBUTE_NAME in dataset.attrs:
         return dataset
-    return convert_dataset_units(dataset, read_si_scales(dataset), **DISPLAY_BASE_UNITS)
+    return convert_dataset_units(
+        dataset, read_si_scales(dataset), **DISPLAY_UNITS_OF_STRESS_LENGTH_TIME
+    )
 
 
 def has_units_other_than_display_units(dataset: xr.Dataset) -> bool:
@@ -318,9 +320,9 @@ def has_units_other_than_display_units(dataset: xr.Dataset) -> bool:
         True if the results were converted to units other than MPa, um and s, or if the results have
         physical units but no rig.
     """
-    told = dataset.attrs.get(NAME_OF_SCALES_ATTRIBUTE, "")
+    told = dataset.attrs.get(UNIT_SCALES_ATTRIBUTE_NAME, "")
     as_shown = "sigma_star" in dataset.variables and all(
-        f" {u}," in told for u in DISPLAY_BASE_UNITS.values()
+        f" {u}," in told for u in DISPLAY_UNITS_OF_STRESS_LENGTH_TIME.values()
     )
     return bool(told) and not as_shown
 
@@ -404,7 +406,7 @@ def multiply_variables_by_unit_scales(
     told = ", ".join(
         f"{n} = {_format_number_or_range(s.factor)} {s.units}" for n, s in scales_by_name.items()
     )
-    return copy_with_cf_encoding(result.assign_attrs({NAME_OF_SCALES_ATTRIBUTE: told}))
+    return copy_with_cf_encoding(result.assign_attrs({UNIT_SCALES_ATTRIBUTE_NAME: told}))
 
 
 def convert_to_dimensional_variable_name(variable_name: str) -> str:

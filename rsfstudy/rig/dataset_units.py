@@ -21,9 +21,11 @@ class DatasetUnits:
     """
 
     #: Name of the dataset attribute that lists the scales after a conversion.
-    SCALES_ATTRIBUTE_NAME: ClassVar[str] = dataset_unit_scales.NAME_OF_SCALES_ATTRIBUTE
+    UNIT_SCALES_ATTRIBUTE_NAME: ClassVar[str] = dataset_unit_scales.UNIT_SCALES_ATTRIBUTE_NAME
     #: Units of stress, length and time in tables and figures of rigs.
-    DISPLAY_UNITS: ClassVar[Mapping[str, str]] = dataset_unit_scales.DISPLAY_BASE_UNITS
+    DISPLAY_UNITS: ClassVar[Mapping[str, str]] = (
+        dataset_unit_scales.DISPLAY_UNITS_OF_STRESS_LENGTH_TIME
+    )
     #: Prefix of the name of a dimensionless field if an axis in physical units has the same name.
     DIMENSIONLESS_PREFIX: ClassVar[str] = dataset_unit_scales.DIMENSIONLESS_PREFIX
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from rsfstudy._deprecation import accept_former_keyword_names
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.rig.column_reading import RecordReadingOptions, read_columns
-from rsfstudy.rig.common_headings import AcceptedRecordColumns
+from rsfstudy.rig.record_column_detection import AcceptedRecordColumns
 from rsfstudy.rig.rig import DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD, Rig
 from rsfstudy.rig.table_columns import Column
 from rsfstudy.rig.table_files import read_table
@@ -36,7 +36,7 @@ _DIMENSIONLESS_UNIT_BY_HISTORY_COLUMN = {
 
 
 @accept_former_keyword_names
-@error_boundary
+@raise_only_rsfstudy_errors
 def history(
     record: Any,
     rig: Rig | None = None,
@@ -245,7 +245,7 @@ def _compute_load_point_velocity(
 
 
 @accept_former_keyword_names
-@error_boundary
+@raise_only_rsfstudy_errors
 def read_protocol(
     path: str | Path, rig: Rig | None = None, name: str = "protocol", *, decimal: str = "."
 ) -> Protocol:

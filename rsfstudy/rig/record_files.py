@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.fitting import RECORD_COLUMNS, Record
 from rsfstudy.rig.column_reading import ColumnsReadFromSource, RecordReadingOptions, read_columns
-from rsfstudy.rig.common_headings import (
+from rsfstudy.rig.record_column_detection import (
     AcceptedRecordColumns,
     build_missing_columns_error,
     compute_factor_to_record_units,
@@ -32,7 +32,7 @@ _ACCEPTED_RECORD_COLUMNS = AcceptedRecordColumns(
 )
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def read_record(
     source: Any,
     columns: Mapping[str, Any] | None = None,
@@ -143,7 +143,7 @@ def read_record(
     values, smoothing = options.filter_and_thin_columns(values, ("friction",))
     processing = tuple(found.row_selection_descriptions + smoothing)
     if (chosen := parse_smoothing_filter(filter)) is not None:
-        filter = f"{chosen.kind} {chosen.size!r}"
+        filter = f"{chosen.kind} {chosen.averaging_time_or_frequency!r}"
     if earlier is not None:
         processing = earlier.processing + processing
         earlier = replace(earlier, name=name or earlier.name, filter=filter or earlier.filter)

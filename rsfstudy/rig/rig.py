@@ -16,8 +16,8 @@ import xarray as xr
 
 from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
 from rsfstudy.axes import Axis
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.rig import axes_with_units
@@ -33,11 +33,11 @@ from rsfstudy.rig.rig_quantities import (
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
     RIG_QUANTITIES,
     SCENE_QUANTITY_BY_FIELD_NAME,
-    SI_UNIT_BY_SCALE,
+    SI_UNIT_BY_DIMENSIONLESS_UNIT,
     check_rig_quantities_are_consistent,
     convert_rig_to_display_units,
     convert_rig_value_to_si,
-    convert_rig_value_to_si_and_warn,
+    convert_to_si_and_warn_if_unusual,
     derive_scene_fields_from_rig,
     find_si_units_of_scene_field,
     is_stiffness_in_friction_per_length,
@@ -55,7 +55,7 @@ DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD = {
 
 
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Rig(HtmlTableMixin):
     r"""Laboratory rig with quantities in physical units.
@@ -174,13 +174,13 @@ class Rig(HtmlTableMixin):
                 object.__setattr__(
                     self,
                     name,
-                    convert_rig_value_to_si_and_warn(
+                    convert_to_si_and_warn_if_unusual(
                         name, getattr(self, name), self._normal_stress_in_pa
                     ),
                 )
         check_rig_quantities_are_consistent(self.as_dict())
 
-    def quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
+    def iterate_quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
         """Iterate over the quantities of the rig.
 
         Yields
@@ -195,7 +195,7 @@ class Rig(HtmlTableMixin):
             yield Quantity(name, about.symbol, about.si_units, about.meaning), value
 
     @property
-    def scales(self) -> dict[str, UnitScale]:
+    def si_scale_by_dimensionless_unit(self) -> dict[str, UnitScale]:
         """SI values of dimensionless units such as ``D_c/V_*``."""
         return compute_unit_scales_of_rig(self.as_dict())
 
@@ -222,11 +222,18 @@ class Rig(HtmlTableMixin):
             If the value is not a quantity, if its units are incompatible, or if the scale is
             unknown.
         """
-        if scale not in self.scales:
-            raise InvalidValue("scale", scale, "is not a scale of a rig", choices=self.scales)
+        if scale not in self.si_scale_by_dimensionless_unit:
+            raise InvalidValue(
+                "scale",
+                scale,
+                "is not a scale of a rig",
+                choices=self.si_scale_by_dimensionless_unit,
+            )
         return float(
-            convert_rig_value_to_si(name, value, SI_UNIT_BY_SCALE[scale], self._normal_stress_in_pa)
-            / self.scales[scale].factor
+            convert_rig_value_to_si(
+                name, value, SI_UNIT_BY_DIMENSIONLESS_UNIT[scale], self._normal_stress_in_pa
+            )
+            / self.si_scale_by_dimensionless_unit[scale].factor
         )
 
     def __repr__(self) -> str:
@@ -235,7 +242,7 @@ class Rig(HtmlTableMixin):
         parts = [f"{name}='{value:.12g} {units}'" for name, (value, units) in shown.items()]
         return f"Rig({', '.join(parts)})"
 
-    @SceneFields.add_to_signature("b", *RATIO_FIELD_BY_DIMENSIONAL_NAME)
+    @SceneFields.decorator_adding_fields_to_signature("b", *RATIO_FIELD_BY_DIMENSIONAL_NAME)
     def scene(self, **fields: Any) -> Scene:
         """Create a scene of this rig.
 
@@ -404,7 +411,7 @@ class Rig(HtmlTableMixin):
         return {name: value for name, value in found.items() if value is not None}
 
     @property
-    def axis_fields(self) -> dict[str, float]:
+    def si_values_by_axis_name(self) -> dict[str, float]:
         """Rig quantities in SI units, keyed by the names that axes use."""
         return {
             AXIS_NAME_BY_RIG_QUANTITY.get(name, name): value

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import InvalidValue, RsfStudyWarning
+from rsfstudy.exception_conversion import find_stacklevel_of_user_code
 from rsfstudy.rig.units import compute_conversion_factor, convert_to_si, multiply_by_exact_fraction
 from rsfstudy.slider import SceneFields
 
@@ -99,7 +99,7 @@ RIG_QUANTITY_BY_AXIS_NAME = {
 }
 #: SI units, keyed by the scales of scene fields. A scale is the dimensionless unit of a scene
 #: field.
-SI_UNIT_BY_SCALE = {
+SI_UNIT_BY_DIMENSIONLESS_UNIT = {
     "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
     "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
 }  # fmt: skip
@@ -115,7 +115,7 @@ RATIO_FIELD_BY_DIMENSIONAL_NAME = {
 }
 
 
-def convert_rig_value_to_si_and_warn(
+def convert_to_si_and_warn_if_unusual(
     quantity_name: str, value: Any, normal_stress: float | None = None
 ) -> float:
     """Convert a rig quantity to SI units, and warn about unusual values.
@@ -401,10 +401,10 @@ def find_si_units_of_scene_field(field_name: str, value: Any) -> str | None:
     if about is None or isinstance(value, type) or (plain and field_name.endswith("_ratio")):
         return None
     if about.scale:
-        return SI_UNIT_BY_SCALE[about.scale]
+        return SI_UNIT_BY_DIMENSIONLESS_UNIT[about.scale]
     with_units = hasattr(value, "magnitude") or (isinstance(value, str) and about.units)
     return (
-        (SI_UNIT_BY_SCALE.get(about.units) or ("1" if about.units == "1" else None))
+        (SI_UNIT_BY_DIMENSIONLESS_UNIT.get(about.units) or ("1" if about.units == "1" else None))
         if with_units
         else None
     )

@@ -24,9 +24,9 @@ from rsfstudy.rig.rig_quantities import (
     REQUIRED_RIG_QUANTITIES,
     RIG_QUANTITY_BY_AXIS_NAME,
     SCENE_QUANTITY_BY_FIELD_NAME,
-    SI_UNIT_BY_SCALE,
+    SI_UNIT_BY_DIMENSIONLESS_UNIT,
     check_rig_quantities_are_consistent,
-    convert_rig_value_to_si_and_warn,
+    convert_to_si_and_warn_if_unusual,
     derive_scene_fields_from_rig,
     is_dimensionless_field_with_scale,
     is_stiffness_in_friction_per_length,
@@ -75,7 +75,7 @@ class RigAxesToScenesConverter:
                 raise InvalidValue(name, theirs.get(name), rule, remedy=remedy)
         for along in self.axes:
             for row in along.rows:
-                lacks = [name for name in self.rig.axis_fields if name not in row]
+                lacks = [name for name in self.rig.si_values_by_axis_name if name not in row]
                 if lacks and not {
                     AXIS_NAME_BY_RIG_QUANTITY.get(name, name) for name in REQUIRED_RIG_QUANTITIES
                 } & set(lacks):
@@ -236,7 +236,7 @@ def _is_close_within_rounding(other_value: Any, value: Any) -> bool:
     return isinstance(other_value, float) and math.isclose(other_value, value, rel_tol=1e-9)
 
 
-def convert_scene_and_axes_to_rig(
+def convert_scene_and_axes_to_rig_units(
     rig: Rig, base_scene: Scene, axes: Sequence[Axis]
 ) -> tuple[Scene, list[Axis], dict[str, float]]:
     """Convert a dimensionless scene and its axes to physical units.
@@ -269,7 +269,9 @@ def convert_scene_and_axes_to_rig(
             if is_dimensionless_field_with_scale(n)
         }
         units = {
-            n: DISPLAY_UNIT_BY_SI_UNIT.get(SI_UNIT_BY_SCALE[scale], SI_UNIT_BY_SCALE[scale])
+            n: DISPLAY_UNIT_BY_SI_UNIT.get(
+                SI_UNIT_BY_DIMENSIONLESS_UNIT[scale], SI_UNIT_BY_DIMENSIONLESS_UNIT[scale]
+            )
             for n, scale in scales.items()
         }
         sizes = {
@@ -325,7 +327,7 @@ def replace_rig_quantity(
         quantity = RIG_QUANTITY_BY_AXIS_NAME[quantity_name]
         rig = replace(
             rig,
-            **{quantity: convert_rig_value_to_si_and_warn(quantity, value, rig.normal_stress)},
+            **{quantity: convert_to_si_and_warn_if_unusual(quantity, value, rig.normal_stress)},
         )
     return rig, changed
 

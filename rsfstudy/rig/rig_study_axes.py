@@ -18,4 +18,6 @@ class RigAxes:
         axes_with_units.convert_axis_values_to_axis_units
     )
     replace_rig_quantity = staticmethod(rig_scenes.replace_rig_quantity)
-    convert_scene_and_axes_to_rig = staticmethod(rig_scenes.convert_scene_and_axes_to_rig)
+    convert_scene_and_axes_to_rig_units = staticmethod(
+        rig_scenes.convert_scene_and_axes_to_rig_units
+    )

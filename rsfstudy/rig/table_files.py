@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from rsfstudy._deprecation import build_getattr_for_former_names
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.quantities import split_heading_into_name_and_units
 from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.table_sources import LazyTable
+from rsfstudy.rig.readers.tables_from_files_or_objects import LazyTable
 from rsfstudy.rig.table_columns import (
     EXAMPLE_OF_TABLE_HEADER,
     Column,
@@ -29,7 +29,7 @@ __getattr__ = build_getattr_for_former_names(__name__)
 ColumnChoosingFunction = Callable[[list[str], str], dict[str, ColumnSelection]]
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def read_table(
     path: str | Path,
     columns: Mapping[str, Any] | ColumnChoosingFunction | None = None,

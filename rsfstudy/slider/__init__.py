@@ -27,7 +27,7 @@ has its own data structure:
    functions of floats, for example the ``evolution`` of a law.
 2. Friction: ``friction.FrictionFunctions`` combines the functions of the law, the normal stress,
    the fluid and the loading into the friction relation and the evolution of all states
-   (``scene.friction_functions``).
+   (``scene.friction_law_functions``).
 3. Equations: ``equations.EquationsOfMotion`` holds the rates, unknowns and parameters of a scene in
    one regime. The functions for the rates and for the points are built from the friction functions
    and from the functions of the dynamics. The SciPy integrators call
@@ -74,6 +74,10 @@ if TYPE_CHECKING:
     from rsfstudy.slider.friction import (
         FrictionFunctions,
     )
+    from rsfstudy.slider.integration_path_length import (
+        LOG_SLIP_RATE_PER_PATH_LENGTH,
+        compute_displacement_per_path_length,
+    )
     from rsfstudy.slider.loading import MIN_SEGMENT_DURATION
     from rsfstudy.slider.motion_point import MotionPoint
     from rsfstudy.slider.part_registry import (
@@ -82,10 +86,6 @@ if TYPE_CHECKING:
     from rsfstudy.slider.parts import (
         FloatTuple,
         NumericFunction,
-    )
-    from rsfstudy.slider.path_length import (
-        LOG_SLIP_RATE_PER_PATH_LENGTH,
-        compute_displacement_per_path_length,
     )
     from rsfstudy.slider.sampled_loading import (
         SampledHistory,
@@ -124,7 +124,7 @@ else:
                 "NumericFunction",
                 "FloatTuple",
             ),
-            "slider.path_length": (
+            "slider.integration_path_length": (
                 "LOG_SLIP_RATE_PER_PATH_LENGTH",
                 "compute_displacement_per_path_length",
             ),

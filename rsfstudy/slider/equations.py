@@ -154,7 +154,7 @@ def build_equations_without_mass(scene: SceneView, *, with_time: bool) -> Equati
     EquationsOfMotion
         Quasi-static equations with path length as the independent variable.
     """
-    if scene.dynamics.build_rupture_rate_function is None:
+    if scene.dynamics.build_rate_function_for_ruptures is None:
         return build_equations_between_ruptures(scene, with_time=with_time)
     return _build_equations_for_dynamics(scene, QuasiStatic(), with_time=with_time)
 
@@ -163,7 +163,7 @@ def _build_equations_for_dynamics(
     scene: SceneView, dynamics: Dynamics, *, with_time: bool, against_path_length: bool = True
 ) -> EquationsOfMotion:
     """Build the equations between ruptures for the given dynamics."""
-    friction = scene.friction_functions
+    friction = scene.friction_law_functions
     balance, growth = _build_cached_slip_rate_functions(
         friction, dynamics.build_slip_rate_functions
     )
@@ -236,13 +236,13 @@ def _build_rupture_equations(
     scene: SceneView, *, with_time: bool = False, against_path_length: bool = True
 ) -> EquationsOfMotion:
     """Build the rupture equations. Raise TypeError if the scene has no inertia."""
-    a, friction, others = scene.a, scene.friction_functions, _list_state_names(scene)[1:]
-    if scene.dynamics.build_rupture_rate_function is None:
+    a, friction, others = scene.a, scene.friction_law_functions, _list_state_names(scene)[1:]
+    if scene.dynamics.build_rate_function_for_ruptures is None:
         raise TypeError(
             f"the dynamics {scene.dynamics.name!r} do not define equations for ruptures"
         )
     by_time, by_path, by_path_with_time = build_rate_functions_in_rupture(
-        friction, scene.dynamics.build_rupture_rate_function
+        friction, scene.dynamics.build_rate_function_for_ruptures
     )
     unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
     scales = (a, 1.0, a, *[a] * len(others))
@@ -323,7 +323,7 @@ def build_equations_at_imposed_slip_rate(
     EquationsOfMotion
         Equations whose last parameter is :math:`\ln(V/V_*)`.
     """
-    friction, unknowns = scene.friction_functions, ("friction", *_list_state_names(scene)[1:])
+    friction, unknowns = scene.friction_law_functions, ("friction", *_list_state_names(scene)[1:])
     return EquationsOfMotion(
         RIGID_REGIME,
         unknowns,

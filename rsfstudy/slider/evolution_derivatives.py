@@ -100,7 +100,7 @@ def compute_state_evolution_derivatives(
         Derivatives with an error estimate.
     """
     evolutions, p = (
-        scene.friction_functions.state_evolutions,
+        scene.friction_law_functions.state_evolutions,
         scene.friction_parameter_values,
     )
     relation = build_friction_relation(scene, steady_state.states)
@@ -194,7 +194,7 @@ def _compute_finite_difference_scales(
     scene: SceneView, steady_state: SteadySliding, stress_induced_state_shift: float
 ) -> list[float]:
     """Return the finite-difference scales of ln V, the shift and each state."""
-    size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_per_log_rate_over_a
+    size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.steady_state_change_per_log_rate_over_a
     # If the law has several states, the sum of all b may be close to zero even if each b is large.
     of_shift = (
         size if scene.parts.law.state_count > 1 else _STATE_SCALE_OVER_B * abs(scene.b) or size

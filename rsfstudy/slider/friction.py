@@ -31,8 +31,8 @@ from typing import NamedTuple
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider import (
     friction_relation,
-    path_length,
-    state_functions,
+    integration_path_length,
+    state_variable_functions,
     temperature_functions,
 )
 from rsfstudy.slider.parts import FloatTuple, NumericFunction
@@ -76,14 +76,14 @@ class FrictionFunctions(NamedTuple):
     states_from_strength : callable
         Function ``(strength, log_slip_rate, others, p)`` that returns all states. The first state
         is computed from the strength, the slip rate and the other states.
-    load_point_stress : callable
+    load_point_oscillation_stress : callable
         Function ``(psis, p)`` that returns the shear stress :math:`K D`. The frictional stress g
         does not include this stress.
-    load_point_stress_change : callable
+    load_point_oscillation_stress_change : callable
         Function ``(changes)`` that returns the change in the shear stress :math:`K D`.
     state_count : int
         Number of states.
-    indices_of_states_in_distance : tuple of int
+    state_indices_in_steady_state_distance : tuple of int
         Indices of the states from which the distance from steady sliding is computed.
     spring_stress_rate : callable
         Function ``(load, slip, compute_velocity_ratios, p)`` that returns the derivative of the
@@ -101,11 +101,11 @@ class FrictionFunctions(NamedTuple):
     state_contribution_to_friction: NumericFunction
     strength_derivatives_by_pressure: NumericFunction
     states_from_strength: NumericFunction
-    load_point_stress: NumericFunction
-    load_point_stress_change: NumericFunction
+    load_point_oscillation_stress: NumericFunction
+    load_point_oscillation_stress_change: NumericFunction
     state_count: int
-    indices_of_states_in_distance: tuple[int, ...]
-    spring_stress_rate: NumericFunction = path_length.compute_spring_stress_rate
+    state_indices_in_steady_state_distance: tuple[int, ...]
+    spring_stress_rate: NumericFunction = integration_path_length.compute_spring_stress_rate
 
 
 def build_friction_functions(scene: SceneView) -> FrictionFunctions:
@@ -123,23 +123,25 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         functions.
     """
     law, source, loading = scene.parts.law, scene.pressure_source, scene.stress_imposing_part
-    oscillates, law_states = loading.has_load_point_unknown, law.state_count
+    oscillates, law_states = loading.adds_load_point_displacement_unknown, law.state_count
     boundary = -1 - len(scene.parts.fluid.unknowns) if loading.adds_normal_stress_unknowns else 0
     strength, effective, outer, derivatives = _build_functions_of_frictional_stress(
         scene.parts.normal_stress.normal_stress
-        or friction_relation.return_zero_normal_stress_excess,
+        or friction_relation.return_zero_normal_stress_change,
         _list_stress_effect_functions(scene),
         "load point" if oscillates else "pressure" if source.unknowns else "",
         boundary,
         law.regularised,
     )
-    evolutions, steady_states = state_functions.find_evolutions_and_steady_states_of_law(law)
+    evolutions, steady_states = state_variable_functions.get_evolution_and_steady_state_functions(
+        law
+    )
     if source.unknowns:
         evolutions, steady_states = (
-            state_functions.combine_law_and_auxiliary_rates(
+            state_variable_functions.combine_law_and_auxiliary_rates(
                 evolutions, source.auxiliary_rates, law_states
             ),
-            state_functions.combine_law_and_auxiliary_steady_states(
+            state_variable_functions.combine_law_and_auxiliary_steady_states(
                 steady_states, source.auxiliary_steady_states
             ),
         )
@@ -152,24 +154,26 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         boundary_pressure=friction_relation.build_pore_pressure_function(boundary),
         state_evolutions=evolutions,
         steady_states=steady_states,
-        state_sum=state_functions.build_tuple_sum_function(law_states),
-        state_variable=state_functions.return_isothermal_state_variable,
-        state_contribution_to_friction=state_functions.build_state_contribution_function(
+        state_sum=state_variable_functions.build_tuple_sum_function(law_states),
+        state_variable=state_variable_functions.return_isothermal_state_variable,
+        state_contribution_to_friction=state_variable_functions.build_state_contribution_function(
             law_states, derivatives if source.unknowns else None
         ),
         strength_derivatives_by_pressure=derivatives,
-        states_from_strength=state_functions.build_states_from_strength_function(law_states),
-        load_point_stress=friction_relation.compute_load_point_stress
+        states_from_strength=state_variable_functions.build_states_from_strength_function(
+            law_states
+        ),
+        load_point_oscillation_stress=friction_relation.compute_load_point_oscillation_stress
         if oscillates
-        else friction_relation.return_zero_load_point_stress,
-        load_point_stress_change=friction_relation.build_pore_pressure_function(
+        else friction_relation.return_zero_load_point_oscillation,
+        load_point_oscillation_stress_change=friction_relation.build_pore_pressure_function(
             -1 if oscillates else 0
         ),
         state_count=scene.state_count,
-        indices_of_states_in_distance=(*range(law_states), *compared),
-        spring_stress_rate=path_length.compute_spring_stress_rate_with_noise
+        state_indices_in_steady_state_distance=(*range(law_states), *compared),
+        spring_stress_rate=integration_path_length.compute_spring_stress_rate_with_noise
         if scene.parts.loading_noise.is_active
-        else path_length.compute_spring_stress_rate,
+        else integration_path_length.compute_spring_stress_rate,
     )
     if not scene.parts.temperature.unknowns:
         return functions
@@ -212,7 +216,7 @@ def _build_functions_of_frictional_stress(
         friction_relation.build_effective_normal_stress_function(normal_stress_function, index)
         for index in (-1 if kind_of_last_unknown == "pressure" else 0, boundary_pressure_index)
     )
-    is_variable = normal_stress_function is not friction_relation.return_zero_normal_stress_excess
+    is_variable = normal_stress_function is not friction_relation.return_zero_normal_stress_change
     strength = (
         friction_relation.build_strength_function(effective, effect)
         if is_variable or state_effect_functions or kind_of_last_unknown == "pressure"
@@ -222,7 +226,7 @@ def _build_functions_of_frictional_stress(
         strength = friction_relation.extend_relation_to_reversed_slip(strength)
     if kind_of_last_unknown == "load point":
         strength, effective, outer = map(
-            friction_relation.add_load_point_stress_to_argument, (strength, effective, outer)
+            friction_relation.add_load_point_oscillation_to_argument, (strength, effective, outer)
         )
         derivatives = friction_relation.build_strength_derivatives_by_load_point(strength)
     else:
@@ -248,7 +252,7 @@ def build_friction_relation(
     callable
         Function ``g -> (strength, slope, shift, shift_slope)``.
     """
-    strength, p = scene.friction_functions.strength, scene.friction_parameter_values
+    strength, p = scene.friction_law_functions.strength, scene.friction_parameter_values
     known = states or (0.0,) * scene.state_count
     return lambda friction: strength(friction, known, p)
 
@@ -274,7 +278,7 @@ def compute_effective_normal_stress(
         Effective normal stress in :math:`\sigma_*`.
     """
     at = states or (0.0,) * scene.state_count
-    stress = scene.friction_functions.effective_normal_stress(
+    stress = scene.friction_law_functions.effective_normal_stress(
         frictional_stress, at, scene.friction_parameter_values
     )
     return 1.0 + float(stress[0])
@@ -296,7 +300,7 @@ def build_state_evolution_function(
         Function ``(log_slip_rate, psis, shift)`` that returns the derivative of each state with
         respect to slip in :math:`D_c`.
     """
-    evolutions, p = scene.friction_functions.state_evolutions, scene.friction_parameter_values
+    evolutions, p = scene.friction_law_functions.state_evolutions, scene.friction_parameter_values
     return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
 
 
@@ -320,7 +324,7 @@ def compute_steady_states(
         States :math:`\Psi_i` of steady sliding.
     """
     p = scene.friction_parameter_values
-    states: FloatTuple = scene.friction_functions.steady_states(
+    states: FloatTuple = scene.friction_law_functions.steady_states(
         log_slip_rate, stress_induced_state_shift, p
     )
     if not scene.parts.temperature.unknowns:

@@ -50,7 +50,7 @@ from rsfstudy.slider.parts import FloatTuple, NumericFunction
 _MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 
-def return_zero_normal_stress_excess(
+def return_zero_normal_stress_change(
     frictional_stress: float, p: FloatTuple
 ) -> tuple[float, float]:
     """Return a zero change in normal stress and a zero derivative."""
@@ -272,12 +272,12 @@ def build_strength_derivatives_by_pressure(
     return pressure_derivatives
 
 
-def return_zero_load_point_stress(states: FloatTuple, p: FloatTuple) -> float:
+def return_zero_load_point_oscillation(states: FloatTuple, p: FloatTuple) -> float:
     """Return zero, because a load point that moves steadily adds no stress."""
     return 0.0
 
 
-def compute_load_point_stress(states: FloatTuple, p: FloatTuple) -> float:
+def compute_load_point_oscillation_stress(states: FloatTuple, p: FloatTuple) -> float:
     r"""Compute the shear stress :math:`K D` due to an oscillation of the load point.
 
     The unknown of the loading is the last element of the tuple of states. The stress is zero at the
@@ -286,7 +286,7 @@ def compute_load_point_stress(states: FloatTuple, p: FloatTuple) -> float:
     return states[-1] - p[LOADING + 2]
 
 
-def add_load_point_stress_to_argument(friction_function: NumericFunction) -> NumericFunction:
+def add_load_point_oscillation_to_argument(friction_function: NumericFunction) -> NumericFunction:
     """Return a friction function that includes the load point stress.
 
     The argument g of ``friction_function`` is the total frictional stress. The argument g of the
@@ -294,7 +294,7 @@ def add_load_point_stress_to_argument(friction_function: NumericFunction) -> Num
     """
 
     def function_with_load_point_stress(g: float, psis: FloatTuple, p: FloatTuple) -> FloatTuple:
-        return friction_function(g + compute_load_point_stress(psis, p), psis, p)
+        return friction_function(g + compute_load_point_oscillation_stress(psis, p), psis, p)
 
     return function_with_load_point_stress
 

@@ -46,7 +46,7 @@ from rsfstudy.slider.polynomials import (
 )
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
-from rsfstudy.slider.temperature_functions import compute_derivatives_by_temperature
+from rsfstudy.slider.temperature_functions import compute_thermal_friction_derivatives
 
 
 class LinearisedForceBalance(NamedTuple):
@@ -143,12 +143,12 @@ def _compute_state_weights_in_friction(
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     weights, shifts = [1.0] * law, dict[int, float]()
     if scene.parts.temperature.unknowns:
-        gained, shifts[law] = compute_derivatives_by_temperature(
+        gained, shifts[law] = compute_thermal_friction_derivatives(
             steady_state.states[law], pack_temperature_parameter_values(scene)
         )
         weights.append(-gained)
     if fluid:
-        by_pressure = scene.friction_functions.strength_derivatives_by_pressure
+        by_pressure = scene.friction_law_functions.strength_derivatives_by_pressure
         gained, shifts[-1] = by_pressure(
             steady_state.frictional_stress, steady_state.states, scene.friction_parameter_values
         )

@@ -45,7 +45,7 @@ def build_motion_point_assembling_function(
     steady_states, state_sum, counted = (
         friction_functions.steady_states,
         friction_functions.state_sum,
-        friction_functions.indices_of_states_in_distance,
+        friction_functions.state_indices_in_steady_state_distance,
     )
     effective_stress, stress = (
         friction_functions.effective_normal_stress,
@@ -54,8 +54,8 @@ def build_motion_point_assembling_function(
     state_variable = friction_functions.state_variable
     pressure, imposed, imposed_change = (
         friction_functions.boundary_pressure,
-        friction_functions.load_point_stress,
-        friction_functions.load_point_stress_change,
+        friction_functions.load_point_oscillation_stress,
+        friction_functions.load_point_oscillation_stress_change,
     )
 
     def point_at(

@@ -152,7 +152,7 @@ class UnitNoisePath(NamedTuple):
         return np.asarray(ndtri(uniform))
 
 
-def iterate_segment_table_blocks(
+def iterate_noisy_loading_segment_blocks(
     start_time: float,
     end_time: float,
     load_velocity: float,

@@ -109,7 +109,7 @@ def pack_friction_parameter_values(scene: SceneView) -> FloatTuple:
         describe the spring and the load point are NaN.
     """
     parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
-    size = slider.a * law.state_change_per_log_rate_over_a
+    size = slider.a * law.steady_state_change_per_log_rate_over_a
     size = math.copysign(size, law.b_over_a) if law.state_count == 1 else size
     of_load = math.nan, math.nan, math.nan
     of_stress = law.stress_dependence, scene.imposed_normal_stress
@@ -142,7 +142,7 @@ def pack_temperature_parameter_values(scene: SceneView) -> FloatTuple:
     temperature = scene.parts.temperature
     if not temperature.unknowns:
         return ()
-    direct, evolution = temperature.activation_terms
+    direct, evolution = temperature.dimensionless_activation_energies
     common = scene.a * direct, scene.b * evolution, scene.parts.fluid.pressurisation_factor
     return (*common, *collect_parameter_values(temperature, scene))
 

@@ -507,7 +507,7 @@ def collect_scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, 
     return found
 
 
-def collect_scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
+def collect_python_types_of_scene_fields(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
     """Return the types of the fields of scenes.
 
     Parameters
@@ -540,7 +540,7 @@ def collect_scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, An
 
 
 #: Types of the fields of scenes without user-defined parts.
-SCENE_FIELD_TYPES = collect_scene_field_types(())
+PYTHON_TYPE_BY_SCENE_FIELD = collect_python_types_of_scene_fields(())
 
 
 def iterate_quantities_with_values(

@@ -35,11 +35,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rsfstudy._deprecation import (
     accept_former_keyword_names,
     add_former_member_names,
-    add_new_names_for_former_overrides,
     build_getattr_for_former_names,
+    copy_former_overrides_to_new_names,
 )
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.scene_view import SceneView
 
@@ -57,7 +57,7 @@ FloatTuple = tuple[float, ...]
 
 
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Part:
     """Base class of all parts of a slider.
@@ -114,7 +114,7 @@ class Part:
         of its base class.
         """
         super().__init_subclass__()
-        add_new_names_for_former_overrides(cls)
+        copy_former_overrides_to_new_names(cls)
         if cls.members_defining_equations & vars(cls).keys():
             base = next(
                 kind for kind in cls.__mro__ if "members_derived_from_equations" in vars(kind)

@@ -156,7 +156,7 @@ def _find_causes_of_unknown_friction(scene: SceneView) -> list[_CauseOfUnknownQu
     causes, temperature = [], scene.parts.temperature
     if scene.parts.law.regularised:
         causes.append(("regularised=True", "set regularised=False"))
-    if any(temperature.activation_terms):
+    if any(temperature.dimensionless_activation_energies):
         cause = f"temperature={temperature.name!r}"
         causes.append((cause, "remove the activation terms"))
     return [_CauseOfUnknownQuantity(FRICTION_COEFFICIENT, *texts) for texts in causes]

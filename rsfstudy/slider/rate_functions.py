@@ -25,9 +25,7 @@ from collections.abc import Callable
 from functools import cache
 
 from rsfstudy.slider.friction import FrictionFunctions
-from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, MU_STAR, A
-from rsfstudy.slider.parts import FloatTuple, NumericFunction
-from rsfstudy.slider.path_length import (
+from rsfstudy.slider.integration_path_length import (
     LOG_SLIP_RATE_PER_PATH_LENGTH,
     VelocityRatios,
     compute_displacement_per_path_length,
@@ -35,7 +33,9 @@ from rsfstudy.slider.path_length import (
     compute_time_per_displacement,
     compute_velocity_ratios,
 )
-from rsfstudy.slider.state_functions import build_tuple_scaling_function
+from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, MU_STAR, A
+from rsfstudy.slider.parts import FloatTuple, NumericFunction
+from rsfstudy.slider.state_variable_functions import build_tuple_scaling_function
 
 
 def build_rate_function_by_displacement(
@@ -57,7 +57,7 @@ def build_rate_function_by_displacement(
     """
     evolutions, imposed, end = (
         friction_functions.state_evolutions,
-        friction_functions.load_point_stress,
+        friction_functions.load_point_oscillation_stress,
         1 + friction_functions.state_count,
     )
     spring_stress_rate = friction_functions.spring_stress_rate
@@ -142,7 +142,7 @@ def build_rate_functions_between_ruptures(
 @cache
 def build_rate_functions_in_rupture(
     friction_functions: FrictionFunctions,
-    build_rupture_rate_function: Callable[[FrictionFunctions], NumericFunction],
+    build_rate_function_for_ruptures: Callable[[FrictionFunctions], NumericFunction],
 ) -> tuple[NumericFunction, NumericFunction, NumericFunction]:
     r"""Return the rate functions of a scene in ruptures.
 
@@ -150,7 +150,7 @@ def build_rate_functions_in_rupture(
     ----------
     friction_functions : FrictionFunctions
         Friction functions of the scene.
-    build_rupture_rate_function : callable
+    build_rate_function_for_ruptures : callable
         Function of the dynamics that builds the function for the derivatives with respect to
         inertial time (see ``Dynamics``).
 
@@ -161,7 +161,7 @@ def build_rate_functions_in_rupture(
         :math:`x = \ln(V/V_*)`, of the frictional stress g and of all states except the first. The
         third function appends the derivative of inertial time.
     """
-    rupture_rate_function = build_rupture_rate_function(friction_functions)
+    rupture_rate_function = build_rate_function_for_ruptures(friction_functions)
     if friction_functions.spring_stress_rate is compute_spring_stress_rate_with_noise:
         rupture_rate_function = _add_noise_to_rupture_rates(rupture_rate_function)
     end = 2 + friction_functions.state_count

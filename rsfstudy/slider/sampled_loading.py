@@ -17,8 +17,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.quantities import Quantity, is_valid_variable_name
 from rsfstudy.slider.loading import Segment, ramp
 from rsfstudy.slider.parameter_layout import SEGMENT_LOG_VELOCITY, SEGMENT_STRESS_FALL
@@ -57,7 +57,7 @@ class LazySegmentSequence(Sequence[Segment]):
         return Segment(velocity, duration=ends - begins)
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class SampledHistory(UserLoading):
     """Loading history that interpolates recorded samples.
@@ -93,8 +93,8 @@ class SampledHistory(UserLoading):
         default=None, compare=False, repr=False
     )
 
-    auxiliary_rates = staticmethod(ramp.compute_remaining_normal_stress_rates)
-    auxiliary_steady_states = staticmethod(ramp.return_zero_remaining_normal_stress)
+    auxiliary_rates = staticmethod(ramp.compute_remaining_stress_change_rates)
+    auxiliary_steady_states = staticmethod(ramp.return_zero_remaining_stress_change)
 
     @classmethod
     def from_samples(
@@ -249,7 +249,7 @@ class SampledHistory(UserLoading):
         return LazySegmentSequence(self.segment_table)
 
     @property
-    def jump_mask(self) -> np.ndarray:
+    def jump_at_segment_start_mask(self) -> np.ndarray:
         """False for every segment, because a record is continuous."""
         return np.zeros(len(self.sample_table), dtype=bool)
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.slider import (
     fluid,
     friction,
@@ -36,7 +36,7 @@ from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.scene_functions import SceneFunctions
 from rsfstudy.slider.scene_quantities import SceneQuantities
 from rsfstudy.slider.slider_parameters import SliderParameters
-from rsfstudy.slider.state_functions import check_steady_states
+from rsfstudy.slider.state_variable_functions import check_steady_states_of_user_law
 
 #: Maximum number of cached critical stiffnesses. Studies request the same values repeatedly along
 #: axes that do not affect friction.
@@ -45,7 +45,7 @@ _CRITICAL_STIFFNESS_CACHE_SIZE = 4096
 SINGLE_ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, init=False, repr=False)
 class Scene(SceneFunctions, SceneQuantities):
     r"""Spring-slider with rate- and state-dependent friction.
@@ -275,7 +275,7 @@ class Scene(SceneFunctions, SceneQuantities):
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
         if self.parts.law.name not in laws.BUILT_IN_LAW_CLASS_BY_NAME:
-            check_steady_states(self)
+            check_steady_states_of_user_law(self)
 
     if TYPE_CHECKING:
         mu_star: float
@@ -363,7 +363,8 @@ class Scene(SceneFunctions, SceneQuantities):
         if len(self._loading_segments) == 1:
             return ((self, SINGLE_ENDLESS_SEGMENT_TABLE),)
         table, breaks = map(
-            np.array, (self.parts.loading.segment_table, self.parts.loading.jump_mask)
+            np.array,
+            (self.parts.loading.segment_table, self.parts.loading.jump_at_segment_start_mask),
         )
         if self.parts.law.regularised:  # After reversed slip, a hold may have no solution.
             breaks = breaks | (table[:, parameter_layout.SEGMENT_VELOCITY] == 0.0)
@@ -393,7 +394,7 @@ class Scene(SceneFunctions, SceneQuantities):
         return parameter_layout.pack_friction_parameter_values(self)
 
     @cached_attribute
-    def friction_functions(self) -> friction.FrictionFunctions:
+    def friction_law_functions(self) -> friction.FrictionFunctions:
         """Functions that define the friction of the scene."""
         return friction.build_friction_functions(self)
 

@@ -1,6 +1,6 @@
 """Assembly of the parts of a scene from its fields.
 
-The function ``build_scene_parts`` creates the parts, and ``build_field_index`` assigns each field
+The function ``build_scene_parts`` creates the parts, and ``build_field_lookup`` assigns each field
 to its part.
 """
 
@@ -93,7 +93,7 @@ def build_scene_parts(field_values: Mapping[str, Any]) -> SceneParts:
         If a name is not a field, or if a value violates its rule or does not apply in this scene.
     """
     chosen = tuple(_select_part_for_slot(slot, field_values) for slot in PART_SLOTS)
-    layout = build_field_index(tuple(map(get_part_class, chosen)))
+    layout = build_field_lookup(tuple(map(get_part_class, chosen)))
     values = _group_values_by_part_index(field_values, layout)
     made: list[Any] = [
         part(**values.get(place, {})) if isinstance(part, type) else part
@@ -126,7 +126,7 @@ def replace_field_values(
     """
     made: list[Any] = list(scene_parts)
     for place, values in _group_values_by_part_index(
-        changed_field_values, build_field_index(tuple(map(type, scene_parts[1:])))
+        changed_field_values, build_field_lookup(tuple(map(type, scene_parts[1:])))
     ).items():
         if any(name in values for name in ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS):
             values = {
@@ -138,7 +138,7 @@ def replace_field_values(
 
 
 def _group_values_by_part_index(
-    field_values: Mapping[str, Any], field_index: FieldIndex
+    field_values: Mapping[str, Any], field_lookup: FieldLookup
 ) -> dict[int, dict[str, Any]]:
     """Validate the field values, and group the values of each part.
 
@@ -146,9 +146,9 @@ def _group_values_by_part_index(
     """
     values: dict[int, dict[str, Any]] = {}
     kinds, places, idle = (
-        field_index.part_classes,
-        field_index.part_index_by_field,
-        field_index.value_by_inactive_field,
+        field_lookup.part_classes,
+        field_lookup.part_index_by_field,
+        field_lookup.value_by_inactive_field,
     )
     for name, value in field_values.items():
         place = places.get(name)
@@ -161,11 +161,11 @@ def _group_values_by_part_index(
                 continue
             owner = PART_CLASS_BY_FIELD_NAME[name]
             if name != owner.selecting_field_name or validate_field_value(owner, name, value):
-                raise field_index.rejecting_part_class_by_field[name].build_field_rejection_error(
+                raise field_lookup.rejecting_part_class_by_field[name].build_field_rejection_error(
                     name, value
                 )
         elif name not in PART_SLOT_NAMES:
-            raise _build_unknown_field_error(name, value, field_index)
+            raise _build_unknown_field_error(name, value, field_lookup)
     return values
 
 
@@ -196,7 +196,7 @@ def _select_part_for_slot(slot: PartSlot, field_values: Mapping[str, Any]) -> Us
     return slot.built_in_parts[slot.default_part_name]
 
 
-class FieldIndex(NamedTuple):
+class FieldLookup(NamedTuple):
     """Assignment of fields to the parts of a scene.
 
     Parameters
@@ -213,7 +213,7 @@ class FieldIndex(NamedTuple):
     inapplicable_field_names : frozenset of str
         Names of the fields that do not apply to the scene, whatever their values are. Fields that
         would select another part are not included.
-    names_of_slots_chosen_by_name : tuple of str
+    slot_names_with_part_chosen_by_name : tuple of str
         Names of the slots whose parts are selected by name.
     all_field_names : tuple of str
         Names of all fields, including the fields of user-defined parts.
@@ -226,13 +226,13 @@ class FieldIndex(NamedTuple):
     rejecting_part_class_by_field: Mapping[str, type[Part]]
     value_by_inactive_field: Mapping[str, Any]
     inapplicable_field_names: frozenset[str]
-    names_of_slots_chosen_by_name: tuple[str, ...]
+    slot_names_with_part_chosen_by_name: tuple[str, ...]
     all_field_names: tuple[str, ...]
     names_of_fields_not_selecting_a_part: frozenset[str]
 
 
 @cache
-def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
+def build_field_lookup(part_classes: tuple[type[Part], ...]) -> FieldLookup:
     """Build the field index of scenes from the classes of their parts.
 
     Parameters
@@ -279,7 +279,7 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
     )
     fields = tuple(collect_scene_field_quantities(owned.values()))
     plain = frozenset(fields) - {*PART_SLOT_NAMES, *PART_SELECTING_FIELDS}
-    return FieldIndex(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
+    return FieldLookup(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
 
 
 def find_inapplicable_fields(
@@ -301,7 +301,7 @@ def find_inapplicable_fields(
         valid parts.
     """
     try:
-        layout = build_field_index(
+        layout = build_field_lookup(
             tuple(get_part_class(_select_part_for_slot(slot, field_values)) for slot in PART_SLOTS)
         )
     except InvalidValue:
@@ -334,9 +334,9 @@ def find_user_parts(scene_parts: SceneParts) -> dict[str, UserPart]:
     }
 
 
-def _build_unknown_field_error(name: str, value: Any, field_index: FieldIndex) -> InvalidValue:
+def _build_unknown_field_error(name: str, value: Any, field_lookup: FieldLookup) -> InvalidValue:
     """Return the error for an unknown field name."""
-    for slot, part in zip(PART_SLOTS, field_index.part_classes[1:], strict=True):
+    for slot, part in zip(PART_SLOTS, field_lookup.part_classes[1:], strict=True):
         known = map(get_part_class, slot.user_parts.values())
         owner = next((other for other in known if name in list_part_field_names(other)), None)
         if owner is not None:
@@ -346,5 +346,5 @@ def _build_unknown_field_error(name: str, value: Any, field_index: FieldIndex) -
     remedy, rule = hint_for_unknown_field(name), "is not a scene field"
     # If the name is a known synonym of a field, a list of similar names would be misleading.
     return InvalidValue(
-        "field", name, rule, choices=() if remedy else field_index.all_field_names, remedy=remedy
+        "field", name, rule, choices=() if remedy else field_lookup.all_field_names, remedy=remedy
     )

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any, Self
 
 from rsfstudy._deprecation import translate_former_member_name
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.slider.field_name_hints import hint_for_positional_argument
 from rsfstudy.slider.part_registry import (
@@ -19,9 +19,9 @@ from rsfstudy.slider.part_registry import (
     iterate_quantities_with_values,
 )
 from rsfstudy.slider.scene_assembly import (
-    FieldIndex,
+    FieldLookup,
     SceneParts,
-    build_field_index,
+    build_field_lookup,
     build_scene_parts,
     find_inapplicable_fields,
     find_user_parts,
@@ -33,19 +33,19 @@ from rsfstudy.slider.slider_parameters import ALTERNATIVE_FIELD_NAMES_FOR_STIFFN
 #: Names of internal scene attributes, which ``dir`` does not list.
 _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
     {
-        "field_index",
+        "field_lookup",
         "result_cache",
-        "friction_functions",
+        "friction_law_functions",
         "parameter_values",
         "friction_parameter_values",
         "stored_fields",
         "with_segment",
-        "quantities_with_values",
+        "iterate_quantities_with_values",
     }
 )
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 class SceneBase(HtmlTableMixin):
     """Base class of scenes.
 
@@ -77,10 +77,10 @@ class SceneBase(HtmlTableMixin):
         """Return the value of a field. Each field belongs to a part of the scene."""
         if name.startswith("_"):
             raise AttributeError(name)
-        layout = self.field_index
+        layout = self.field_lookup
         if name in layout.part_index_by_field:
             return getattr(self.parts[layout.part_index_by_field[name]], name)
-        if name in layout.names_of_slots_chosen_by_name:
+        if name in layout.slot_names_with_part_chosen_by_name:
             return getattr(self.parts, name).name
         if name in layout.value_by_inactive_field:
             return layout.value_by_inactive_field[name]
@@ -104,9 +104,9 @@ class SceneBase(HtmlTableMixin):
         return type(self), (self.parts,)
 
     @cached_attribute
-    def field_index(self) -> FieldIndex:
+    def field_lookup(self) -> FieldLookup:
         """Index that assigns each field to a part of the scene."""
-        return build_field_index(tuple(map(type, self.parts[1:])))
+        return build_field_lookup(tuple(map(type, self.parts[1:])))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain Python values.
@@ -119,14 +119,14 @@ class SceneBase(HtmlTableMixin):
         dict of str to object
             Values by field name.
         """
-        values = dict(self.field_index.value_by_inactive_field)
-        for name in self.field_index.names_of_slots_chosen_by_name:
+        values = dict(self.field_lookup.value_by_inactive_field)
+        for name in self.field_lookup.slot_names_with_part_chosen_by_name:
             values[name] = getattr(self.parts, name).name
         for part in self.parts:
             values |= vars(part)
         return {
             name: values[name]
-            for name in self.field_index.all_field_names
+            for name in self.field_lookup.all_field_names
             if name not in DEFAULTS_OMITTED_FROM_STORED_SCENES
             or values[name]
             != (DEFAULTS_OMITTED_FROM_STORED_SCENES[name] if name in PART_SLOT_NAMES else None)
@@ -161,7 +161,7 @@ class SceneBase(HtmlTableMixin):
         """
         history = (
             self.parts.loading.describe()
-            if "loading" in self.field_index.names_of_slots_chosen_by_name
+            if "loading" in self.field_lookup.slot_names_with_part_chosen_by_name
             else {}
         )
         return self.stored_fields() | history
@@ -171,7 +171,7 @@ class SceneBase(HtmlTableMixin):
         """User-defined parts of the scene."""
         return tuple(find_user_parts(self.parts).values())
 
-    def quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
+    def iterate_quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
         """Iterate over the fields that have a value.
 
         Returns
@@ -205,7 +205,7 @@ class SceneBase(HtmlTableMixin):
             If a value is invalid in the new scene.
         """
         if all(
-            n in self.field_index.names_of_fields_not_selecting_a_part and value is not None
+            n in self.field_lookup.names_of_fields_not_selecting_a_part and value is not None
             for n, value in changes.items()
         ):
             return type(self)(replace_field_values(self.parts, changes))

@@ -21,7 +21,7 @@ class SceneFields:
     #: Names, quantities and types of the fields of built-in parts.
     NAMES = part_registry.SCENE_FIELD_NAMES
     QUANTITIES = part_registry.SCENE_FIELD_QUANTITIES
-    TYPES = part_registry.SCENE_FIELD_TYPES
+    VALUE_TYPE_BY_NAME = part_registry.PYTHON_TYPE_BY_SCENE_FIELD
     #: Fields whose values are parts, and fields that determine which part is used.
     PART_SLOT_NAMES = part_registry.PART_SLOT_NAMES
     NAMES_SELECTING_A_PART = part_registry.PART_SELECTING_FIELDS
@@ -33,15 +33,17 @@ class SceneFields:
     ALTERNATIVE_NAMES_FOR_STIFFNESS = slider_parameters.ALTERNATIVE_FIELD_NAMES_FOR_STIFFNESS
 
     list_names_of_part = staticmethod(parts.list_part_field_names)
-    collect_types_with_user_parts = staticmethod(part_registry.collect_scene_field_types)
-    collect_defaults = staticmethod(part_registry.collect_scene_field_defaults)
-    collect_quantities_with_user_parts = staticmethod(part_registry.collect_scene_field_quantities)
+    map_field_names_to_value_types = staticmethod(
+        part_registry.collect_python_types_of_scene_fields
+    )
+    map_field_names_to_defaults = staticmethod(part_registry.collect_scene_field_defaults)
+    map_field_names_to_quantities = staticmethod(part_registry.collect_scene_field_quantities)
     iterate_quantities_with_values = staticmethod(part_registry.iterate_quantities_with_values)
-    add_to_signature = staticmethod(part_registry.add_scene_fields_to_signature)
+    decorator_adding_fields_to_signature = staticmethod(part_registry.add_scene_fields_to_signature)
     replace_part_or_alias_by_part_name = staticmethod(
         part_registry.replace_part_or_alias_by_part_name
     )
     find_inapplicable_fields = staticmethod(scene_assembly.find_inapplicable_fields)
-    hint_for_unknown_field = staticmethod(field_name_hints.hint_for_unknown_field)
-    register_user_parts = staticmethod(part_registry.register_user_parts)
+    build_hint_for_unknown_field = staticmethod(field_name_hints.hint_for_unknown_field)
+    user_parts_registrar = staticmethod(part_registry.register_user_parts)
     replace_names_by_user_parts = staticmethod(part_registry.replace_names_by_user_parts)

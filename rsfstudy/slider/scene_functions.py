@@ -9,8 +9,8 @@ from __future__ import annotations
 from rsfstudy.slider import (
     equations,
     friction,
+    integration_path_length,
     parameter_layout,
-    path_length,
     stability,
     steady_state,
 )
@@ -25,7 +25,7 @@ class SceneFunctions:
     #: Name of the regime of ruptures with inertia.
     RUPTURE_REGIME = equations.RUPTURE_REGIME
     #: Lower limit of ln(V/V_*). A motion without loading ends at this slip rate.
-    LOG_SLIP_RATE_OF_STOPPED_SLIP = path_length.LOG_SLIP_RATE_OF_STOPPED_SLIP
+    LOG_SLIP_RATE_OF_STOPPED_SLIP = integration_path_length.LOG_SLIP_RATE_OF_STOPPED_SLIP
     #: Largest ln(V/V_*) whose exponential is computed.
     LOG_SLIP_RATE_UPPER_LIMIT = parameter_layout.LOG_SLIP_RATE_UPPER_LIMIT
 
@@ -35,17 +35,17 @@ class SceneFunctions:
     equations_at_imposed_slip_rate = equations.build_equations_at_imposed_slip_rate
     equations_against_displacement = equations.build_equations_against_displacement
     equations_against_inertial_time = equations.build_equations_against_inertial_time
-    slow_manifold_point = equations.compute_slow_manifold_point
+    compute_slow_manifold_point = equations.compute_slow_manifold_point
     quasi_static_log_slip_rate = equations.compute_quasi_static_log_slip_rate
 
-    friction_relation = friction.build_friction_relation
-    state_evolution_function = friction.build_state_evolution_function
+    build_friction_relation = friction.build_friction_relation
+    build_state_evolution_function = friction.build_state_evolution_function
     compute_steady_states = friction.compute_steady_states
-    effective_normal_stress_at = friction.compute_effective_normal_stress
+    compute_effective_normal_stress = friction.compute_effective_normal_stress
 
     steady_sliding = steady_state.compute_steady_sliding
     steady_friction_minus_reference = steady_state.compute_steady_friction_minus_reference
-    frictional_stress_after_jump = steady_state.compute_frictional_stress_after_jump
+    frictional_stress_from_strength = steady_state.compute_frictional_stress_from_strength
     frictional_stress_from_friction = steady_state.compute_frictional_stress_from_friction
     min_steady_log_slip_rate = steady_state.find_min_steady_log_slip_rate
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid._boundary_pressure import FluidWithBoundaryPressure
@@ -16,7 +16,7 @@ from rsfstudy.slider.scene_base import SceneBase
 from rsfstudy.slider.scene_caching import cached_attribute
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 class SceneQuantities(SceneBase):
     """Base class of scenes, with properties that are computed from the fields.
 
@@ -72,7 +72,7 @@ class SceneQuantities(SceneBase):
     @property
     def has_mass(self) -> bool:
         """True if the equations of motion in ruptures include inertia."""
-        return self.parts.dynamics.build_rupture_rate_function is not None
+        return self.parts.dynamics.build_rate_function_for_ruptures is not None
 
     @cached_attribute
     def state_count(self) -> int:

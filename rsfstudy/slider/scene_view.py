@@ -41,7 +41,7 @@ class SceneView(Protocol):
         """Parameter tuple ``p`` with NaN for the spring and the load point."""
 
     @property
-    def friction_functions(self) -> Any:
+    def friction_law_functions(self) -> Any:
         """Functions that define the friction of the scene."""
 
     @property

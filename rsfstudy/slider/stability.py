@@ -45,7 +45,7 @@ _RELATIVE_GROWTH_RATE_ROUNDING_ERROR = 64.0 * 2.0**-52
 
 #: If the ratio of the two leading coefficients of the polynomial is below this limit, the mass of
 #: the slider is treated as small.
-_MAX_COEFFICIENT_RATIO_OF_SMALL_MASS = 1e-6
+_SMALL_LEADING_COEFFICIENT_RATIO = 1e-6
 
 
 def compute_critical_stiffness(
@@ -179,7 +179,7 @@ def _compute_growth_rates(
         [0.0, *linearised_balance.friction_response_numerator],
     )
     light = (
-        0.0 < abs(polynomial[-1]) < _MAX_COEFFICIENT_RATIO_OF_SMALL_MASS * abs(polynomial[-2])
+        0.0 < abs(polynomial[-1]) < _SMALL_LEADING_COEFFICIENT_RATIO * abs(polynomial[-2])
         and linearised_balance.slip_rate_norm > 0.0
     )
     roots = find_roots_with_one_very_large_root(polynomial) if light else np.roots(polynomial[::-1])
@@ -344,7 +344,7 @@ def compute_spring_response_to_normal_stress(
     steady = _compute_steady_sliding_or_raise(still, log_slip_rate)
     psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = (
-        scene.friction_functions.strength_derivatives_by_pressure,
+        scene.friction_law_functions.strength_derivatives_by_pressure,
         scene.friction_parameter_values,
     )
     gained, shifted = by_pressure(steady.frictional_stress, psis, p)

@@ -26,7 +26,7 @@ from rsfstudy.slider.temperature_functions import compute_thermal_friction_chang
 #: Largest deviation of frictional stress, in units of sigma_*, that the root search considers.
 _MAX_FRICTIONAL_STRESS_OF_ROOT_SEARCH = 1e9
 #: Smallest ln(V/V_*) that the search for a minimum steady slip rate considers.
-_MIN_LOG_SLIP_RATE_OF_STEADY_SEARCH = -1e6
+_MIN_LOG_SLIP_RATE_OF_ROOT_SEARCH = -1e6
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def compute_steady_friction_minus_reference(scene: SceneView, log_slip_rate: flo
     Ruina (1983), J. Geophys. Res. 88, 10359-10370.
     """
     states = compute_steady_states(scene, log_slip_rate, 0.0)
-    psi = scene.friction_functions.state_sum(states)
+    psi = scene.friction_law_functions.state_sum(states)
     return float(scene.a * log_slip_rate + psi + compute_thermal_friction_change(scene, states))
 
 
@@ -150,11 +150,11 @@ def compute_frictional_stress_from_friction(
         return value - shift - friction_minus_reference
 
     return _find_root_of_increasing_function(
-        residual, friction_minus_reference, _find_min_frictional_stress(scene)
+        residual, friction_minus_reference, _find_frictional_stress_lower_bound(scene)
     )
 
 
-def compute_frictional_stress_after_jump(
+def compute_frictional_stress_from_strength(
     scene: SceneView, strength: float, states: FloatTuple = ()
 ) -> float | None:
     r"""Compute the frictional stress after a sudden change in stress or slip rate.
@@ -185,16 +185,16 @@ def compute_frictional_stress_after_jump(
     return _find_root_of_increasing_function(
         lambda friction: relation(friction)[0] - strength,
         strength,
-        _find_min_frictional_stress(scene),
+        _find_frictional_stress_lower_bound(scene),
     )
 
 
-def _find_min_frictional_stress(scene: SceneView) -> float:
+def _find_frictional_stress_lower_bound(scene: SceneView) -> float:
     """Return the frictional stress above which slip is forward.
 
     Normal stress is positive if the frictional stress exceeds the returned stress.
     """
-    weakest = scene.parts.normal_stress.min_frictional_stress(scene)
+    weakest = scene.parts.normal_stress.compute_frictional_stress_lower_bound(scene)
     # If slip may reverse, strength increases with the magnitude of the stress, whose sign may be
     # positive or negative.
     return max(weakest, -scene.mu_star) if scene.parts.law.regularised else weakest
@@ -259,7 +259,9 @@ def find_min_steady_log_slip_rate(scene: SceneView) -> float:
     strongest = value - shift
     if strongest > 1e6:
         return -math.inf
-    if scene.parts.law.steady_states is None and not any(scene.parts.temperature.activation_terms):
+    if scene.parts.law.steady_states is None and not any(
+        scene.parts.temperature.dimensionless_activation_energies
+    ):
         return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
 
     def excess(log_slip_rate: float) -> float:
@@ -270,6 +272,6 @@ def find_min_steady_log_slip_rate(scene: SceneView) -> float:
     slower = -1.0
     while excess(slower) <= 0.0:
         slower *= 2.0
-        if slower < _MIN_LOG_SLIP_RATE_OF_STEADY_SEARCH:
+        if slower < _MIN_LOG_SLIP_RATE_OF_ROOT_SEARCH:
             return -math.inf
     return float(brentq(excess, slower, 0.0, xtol=1e-12))

@@ -26,21 +26,21 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Any, NamedTuple
 
-from rsfstudy.slider.friction_relation import return_zero_normal_stress_excess
+from rsfstudy.slider.friction_relation import return_zero_normal_stress_change
 from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A, pack_temperature_parameter_values
 from rsfstudy.slider.parts import FloatTuple, NumericFunction, collect_parameter_values
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.state_functions import (
+from rsfstudy.slider.state_variable_functions import (
     build_tuple_sum_function,
-    find_evolutions_and_steady_states_of_law,
+    get_evolution_and_steady_state_functions,
 )
 
 #: Number of parameters that precede the parameters that the temperature part declares.
 _PARAMETER_COUNT_BEFORE_PART_FIELDS = 3
 #: Smallest temperature, relative to T_*. Lower temperatures occur only in trial steps of the
 #: integrator.
-_MIN_TEMPERATURE_OVER_REFERENCE = 1e-3
+_MIN_TEMPERATURE_TO_REFERENCE_RATIO = 1e-3
 #: Limits of the effective normal stress, in sigma_*, that is computed from the friction
 #: coefficient. The limits are exceeded only in trial steps of the integrator.
 _MIN_NORMAL_STRESS, _MAX_NORMAL_STRESS = 1e-12, 1e12
@@ -49,7 +49,7 @@ _NORMAL_STRESS_NEWTON_ITERATION_COUNT = 30
 #: Largest change in ln V between two points along the branch of steady sliding.
 _MAX_LOG_SLIP_RATE_CONTINUATION_STEP = 0.25
 #: Value of ln(V/V_*) below which slip does not heat the fault, to double precision.
-_MIN_HEATING_LOG_SLIP_RATE = -60.0
+_MIN_LOG_SLIP_RATE_OF_HEATING = -60.0
 #: Maximum number of secant iterations in the search for a steady temperature, relative tolerance of
 #: the search, and largest last step that is accepted if rounding errors prevent convergence to this
 #: tolerance.
@@ -89,13 +89,13 @@ def build_temperature_dependent_functions(
     first = LAW + len(collect_parameter_values(parts.law, scene))
     end = first + len(pack_temperature_parameter_values(scene))
     places = _TemperatureIndices(-1 - len(source.unknowns), first, end)
-    stress, oscillates = parts.normal_stress, parts.loading.has_load_point_unknown
+    stress, oscillates = parts.normal_stress, parts.loading.adds_load_point_displacement_unknown
     normal_stress = _build_normal_stress_function(
-        stress.normal_stress or return_zero_normal_stress_excess,
+        stress.normal_stress or return_zero_normal_stress_change,
         has_pressure=bool(source.unknowns) and not oscillates,
         is_linear=stress.normal_stress is None or stress.coupling is not None,
     )
-    evolutions, steady_states = find_evolutions_and_steady_states_of_law(parts.law)
+    evolutions, steady_states = get_evolution_and_steady_state_functions(parts.law)
     replacements: dict[str, Any] = {
         "state_evolutions": _combine_law_temperature_and_other_rates(
             evolutions,
@@ -109,14 +109,17 @@ def build_temperature_dependent_functions(
         "steady_states": _insert_nan_for_steady_temperature(
             steady_states, source.auxiliary_steady_states
         ),
-        "indices_of_states_in_distance": tuple(
-            i + (i >= law_states) for i in isothermal_functions["indices_of_states_in_distance"]
+        "state_indices_in_steady_state_distance": tuple(
+            i + (i >= law_states)
+            for i in isothermal_functions["state_indices_in_steady_state_distance"]
         ),
     }
-    if any(parts.temperature.activation_terms):
+    if any(parts.temperature.dimensionless_activation_energies):
         contribution = isothermal_functions["state_contribution_to_friction"]
         replacements |= {
-            "strength": _add_temperature_to_strength(isothermal_functions["strength"], places),
+            "strength": _add_temperature_effect_to_strength(
+                isothermal_functions["strength"], places
+            ),
             "state_contribution_to_friction": _add_temperature_to_state_contribution(
                 contribution, places
             ),
@@ -141,10 +144,10 @@ def compute_inverse_temperature_change(temperature_rise: float) -> float:
     float
         Value of :math:`\Lambda = T_*/T - 1`.
     """
-    return -temperature_rise / max(1.0 + temperature_rise, _MIN_TEMPERATURE_OVER_REFERENCE)
+    return -temperature_rise / max(1.0 + temperature_rise, _MIN_TEMPERATURE_TO_REFERENCE_RATIO)
 
 
-def compute_derivatives_by_temperature(
+def compute_thermal_friction_derivatives(
     temperature_rise: float, temperature_parameters: FloatTuple
 ) -> tuple[float, float]:
     r"""Compute the derivatives of strength and shift with respect to temperature.
@@ -162,12 +165,12 @@ def compute_derivatives_by_temperature(
         Derivatives with respect to :math:`\vartheta`, :math:`a q_a/(1 + \vartheta)^2` and
         :math:`b q_b/(1 + \vartheta)^2`.
     """
-    falling = max(1.0 + temperature_rise, _MIN_TEMPERATURE_OVER_REFERENCE) ** -2
+    falling = max(1.0 + temperature_rise, _MIN_TEMPERATURE_TO_REFERENCE_RATIO) ** -2
     return temperature_parameters[0] * falling, temperature_parameters[1] * falling
 
 
 @cache
-def _add_temperature_to_strength(
+def _add_temperature_effect_to_strength(
     strength_function: NumericFunction, temperature_indices: _TemperatureIndices
 ) -> NumericFunction:
     """Return a friction relation that includes both activation terms."""
@@ -201,7 +204,7 @@ def _add_temperature_to_state_contribution(
     def thermal_contribution(
         changes: FloatTuple, g: float, psis: FloatTuple, p: FloatTuple
     ) -> float:
-        gained = compute_derivatives_by_temperature(psis[place], p[first:end])[0]
+        gained = compute_thermal_friction_derivatives(psis[place], p[first:end])[0]
         return contribution_function(changes, g, psis, p) - gained * changes[place]
 
     return thermal_contribution
@@ -368,7 +371,7 @@ def compute_steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> f
         Temperature rise :math:`\vartheta`. The result is NaN if the temperature cannot be followed
         continuously to the given slip rate.
     """
-    functions, p = scene.friction_functions, scene.friction_parameter_values
+    functions, p = scene.friction_law_functions, scene.friction_parameter_values
     place, activated = scene.parts.law.state_count, pack_temperature_parameter_values(scene)[1]
 
     def warming(x: float, rise: float) -> float:
@@ -377,10 +380,10 @@ def compute_steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> f
         psis = (*steady[:place], rise, *steady[place + 1 :])
         return float(functions.state_evolutions(x, psis, shift, math.exp(min(x, 0.0)), p)[place])
 
-    log_slip_rate = max(log_slip_rate, _MIN_HEATING_LOG_SLIP_RATE)
+    log_slip_rate = max(log_slip_rate, _MIN_LOG_SLIP_RATE_OF_HEATING)
     count = max(1, math.ceil(abs(log_slip_rate) / _MAX_LOG_SLIP_RATE_CONTINUATION_STEP))
     # Without activation terms, only differences of temperature matter.
-    coldest = -1.0 if any(scene.parts.temperature.activation_terms) else -math.inf
+    coldest = -1.0 if any(scene.parts.temperature.dimensionless_activation_energies) else -math.inf
     rise, before = 0.0, 0.0
     for step in range(count + 1):
         x = log_slip_rate * step / count
@@ -427,7 +430,7 @@ def compute_thermal_friction_change(scene: SceneView, states: FloatTuple) -> flo
         Change in the friction coefficient, :math:`(a q_a - b q_b) \Lambda`. The change is zero if
         the friction does not depend on temperature.
     """
-    if not any(scene.parts.temperature.activation_terms):
+    if not any(scene.parts.temperature.dimensionless_activation_energies):
         return 0.0
     direct, evolution = pack_temperature_parameter_values(scene)[:2]
     rise = states[scene.parts.law.state_count]

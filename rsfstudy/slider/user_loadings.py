@@ -16,8 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import (
+    make_methods_raise_rsfstudy_errors,
+    raise_only_rsfstudy_errors,
+)
 from rsfstudy.quantities import is_valid_variable_name
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parameter_layout import SEGMENT_VELOCITY
@@ -27,7 +30,7 @@ from rsfstudy.slider.scene_view import SceneView
 SEGMENT_MAPPING_KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class UserLoading(Loading, ABC):
     """Base class of protocols and sampled histories.
@@ -82,7 +85,7 @@ class UserLoading(Loading, ABC):
         """Total duration of the input segments or samples in D_c/V_*."""
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Protocol(UserLoading):
     """Loading history that consists of user-defined segments.
@@ -119,7 +122,7 @@ class Protocol(UserLoading):
         return math.fsum(s.duration for s in self.input_segments if s.duration < math.inf)
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "protocol") -> Protocol:
     r"""Create a loading history from a list of segments.
 

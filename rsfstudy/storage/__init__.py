@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         CellJournal,
         CellWallTimes,
     )
-    from rsfstudy.storage.cell_number_lookup import find_cell_number
+    from rsfstudy.storage.cell_number_from_coordinates import find_cell_number
     from rsfstudy.storage.cell_result_arrays import (
         CellJournalRow,
         CellOutputPacker,
@@ -46,7 +46,7 @@ else:
         {
             "storage.zarr_store": ("ZarrStore",),
             "storage.stored_dataset": ("StoredDataset",),
-            "storage.cell_number_lookup": ("find_cell_number",),
+            "storage.cell_number_from_coordinates": ("find_cell_number",),
             "storage.results_comparison": (
                 "ResultsComparison",
                 "compare_results",

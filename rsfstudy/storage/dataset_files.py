@@ -23,8 +23,8 @@ import dask
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten_text
+from rsfstudy.exception_conversion import find_stacklevel_of_user_code
 from rsfstudy.former_data_names import rename_former_variables
 from rsfstudy.netcdf_encoding import build_encoding_without_fill_values, copy_with_cf_encoding
 from rsfstudy.path_checks import check_path_is_valid

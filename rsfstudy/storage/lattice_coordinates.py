@@ -92,7 +92,7 @@ class LatticeCoordinatesBuilder:
         dict of str to tuple or xarray.Variable
             Coordinates by name, in a form that ``xarray.Dataset`` accepts.
         """
-        study, own, coords = self.study, self.study.quantities, dict[Any, Any]()
+        study, own, coords = self.study, self.study.quantities_not_in_vocabulary, dict[Any, Any]()
         fields = {number: scene.as_dict() for number, scene in scenes_by_cell_number.items()}
         for axis, cells in zip(study.axes, self._representative_cells, strict=True):
             coords |= _build_coordinates_along_axis(
@@ -145,7 +145,7 @@ def _build_coordinates_along_axis(
     for name in axis.fields:
         varied = [point.get(name) for point in points]
         about = build_variable_attributes(
-            name, study.quantities, _find_first_value_not_none(varied)
+            name, study.quantities_not_in_vocabulary, _find_first_value_not_none(varied)
         )
         coords[name] = (axis.dimension, _convert_to_storable_array(varied), about)
     return coords

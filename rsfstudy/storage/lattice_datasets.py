@@ -93,7 +93,11 @@ def build_lattice_variables(
     dict of str to tuple
         Dimensions, values and attributes of each variable.
     """
-    layout, dims, own = CellOutputPacker(study.measure), study.dimensions, study.quantities
+    layout, dims, own = (
+        CellOutputPacker(study.measure),
+        study.dimensions,
+        study.quantities_not_in_vocabulary,
+    )
     described = {}
     for name, inner in study.measure.variables.items():
         values = cell_arrays.packed_outputs[:, layout.slices[name]].reshape(

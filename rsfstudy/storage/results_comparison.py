@@ -17,8 +17,8 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.former_data_names import rename_former_declaration_fields
 from rsfstudy.status import Status
 from rsfstudy.storage.run_fingerprints import find_fingerprint_differences
@@ -141,7 +141,7 @@ def _compare_variable(
 
 
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class ResultsComparison:
     """Differences between two results datasets.
@@ -170,7 +170,7 @@ class ResultsComparison:
         Comparison of the variables in the cells that are finished in both datasets. The function
         ``compare_results_of_same_study`` documents the columns. If the primary output has no error
         estimates, every pair of different values of the primary output is counted in
-        ``variables_beyond_errors``.
+        ``variables_differing_beyond_errors``.
     uncompared_variables : mapping of str to str
         Reason why a variable is not compared, by name of the variable.
     """
@@ -184,7 +184,7 @@ class ResultsComparison:
     uncompared_variables: Mapping[str, str]
 
     @property
-    def variables_beyond_errors(self) -> list[str]:
+    def variables_differing_beyond_errors(self) -> list[str]:
         """Names of variables whose difference exceeds the sum of both error estimates."""
         return list(self.agreement_table["variable"][self.agreement_table["beyond_errors"] > 0])
 
@@ -198,7 +198,7 @@ class ResultsComparison:
         return (
             self.finished_cell_counts[0] > 0
             and self.differing_statuses.empty
-            and not self.variables_beyond_errors
+            and not self.variables_differing_beyond_errors
         )
 
 

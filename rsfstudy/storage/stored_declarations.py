@@ -249,7 +249,7 @@ def build_scene_from_stored_fields(
     ]
     values = convert_plain_field_values(
         {**_DEFAULTS_OF_MISSING_SCENE_FIELDS, **stored_fields},
-        tuple(SceneFields.collect_types_with_user_parts(parts).items()),
+        tuple(SceneFields.map_field_names_to_value_types(parts).items()),
         path_in_file,
     )
     scene: Scene = construct_from_field_values(

@@ -17,8 +17,8 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
 from rsfstudy.study.claim_verdict_table import ClaimVerdictTable
@@ -46,7 +46,7 @@ _STRING_FIELDS_OF_CLAIM = (
 
 @accept_former_keyword_names
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Claim:
     """Published value to compare with a result, and the expected verdict.
@@ -129,33 +129,39 @@ class Claim:
         for name in _STRING_FIELDS_OF_CLAIM:
             if not isinstance(getattr(self, name), str):
                 rule = "must be a string"
-                raise self._invalid(name, getattr(self, name), rule)
+                raise self._build_field_error(name, getattr(self, name), rule)
         if self.relation not in CLAIM_RELATIONS:
-            raise self._invalid("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
+            raise self._build_field_error(
+                "relation", self.relation, "is unknown", choices=CLAIM_RELATIONS
+            )
         if self.relation == "equals" and self.reason == DEFAULT_REASON_FOR_TOLERANCE:
             rule = (
                 f"must explain how the tolerance of {self.tolerance} was chosen, but is the default"
             )
-            raise self._invalid("reason", self.reason, rule)
+            raise self._build_field_error("reason", self.reason, rule)
         if self.expected not in _ALLOWED_EXPECTED_VERDICTS:
             rule = "is not a possible verdict"
-            raise self._invalid("expected", self.expected, rule, choices=_ALLOWED_EXPECTED_VERDICTS)
+            raise self._build_field_error(
+                "expected", self.expected, rule, choices=_ALLOWED_EXPECTED_VERDICTS
+            )
         for name in ("published", "tolerance"):
             value = getattr(self, name)
             if isinstance(value, int) and not _is_finite_number(value):
-                raise self._invalid(name, value, "is too large for a floating-point number")
+                raise self._build_field_error(
+                    name, value, "is too large for a floating-point number"
+                )
             if not _is_finite_number(value) or not math.isfinite(value):
-                raise self._invalid(name, value, "must be a finite number")
+                raise self._build_field_error(name, value, "must be a finite number")
         for name in ("where", "baseline"):
             if not isinstance(getattr(self, name), Mapping):
                 rule = "must be a mapping from coordinates to values"
-                raise self._invalid(name, getattr(self, name), rule)
+                raise self._build_field_error(name, getattr(self, name), rule)
             for value in getattr(self, name).values():
                 if not isinstance(value, str) and not _is_finite_number(value):
                     rule = "must be strings or numbers"
-                    raise self._invalid(f"coordinate values in {name!r}", value, rule)
+                    raise self._build_field_error(f"coordinate values in {name!r}", value, rule)
 
-    def _invalid(
+    def _build_field_error(
         self, name: str, value: object, rule: str, *, choices: Iterable[str] = ()
     ) -> InvalidValue:
         """Build an error whose message begins with the identifier of the claim."""
@@ -221,14 +227,14 @@ class Claim:
         for variable in filter(None, (self.variable, self.baseline_variable)):
             if variable not in dataset:
                 rule = "is not a variable of the results"
-                raise self._invalid("variable", variable, rule, choices=sorted(variables))
+                raise self._build_field_error("variable", variable, rule, choices=sorted(variables))
         for name in [*self.where, *self.baseline]:
             if name not in coordinates:
                 rule = "is not a coordinate of the results"
-                raise self._invalid("where", name, rule, choices=sorted(coordinates))
+                raise self._build_field_error("where", name, rule, choices=sorted(coordinates))
         if self.verdict(dataset)[1] == NOT_APPLICABLE_VERDICT:
             rule = "must be a point of the lattice"
-            raise self._invalid("where", {**self.where, **self.baseline}, rule)
+            raise self._build_field_error("where", {**self.where, **self.baseline}, rule)
 
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:
         """Compare the result with the published value.
@@ -266,7 +272,7 @@ class Claim:
         return computed, REPRODUCED_VERDICT if holds else DIFFERS_VERDICT
 
 
-def _note_on_large_error(dataset: xr.Dataset, claim: Claim) -> str:
+def _build_note_on_large_error_estimate(dataset: xr.Dataset, claim: Claim) -> str:
     """Return a note if the error estimate exceeds the tolerance of an equality claim."""
     values = [(claim.variable, claim.where)]
     if claim.baseline:
@@ -312,7 +318,7 @@ def build_verdict_table(
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     is_other_study = [
         name for name in study_overrides if name not in along
-    ] or DatasetUnits.SCALES_ATTRIBUTE_NAME in dataset.attrs
+    ] or DatasetUnits.UNIT_SCALES_ATTRIBUTE_NAME in dataset.attrs
     rows: list[tuple[Any, ...]] = []
     notes: dict[int, str] = {}
     for claim in claims:
@@ -321,7 +327,7 @@ def build_verdict_table(
             dataset, claim.variable, study_overrides
         ):
             verdict = NOT_APPLICABLE_VERDICT
-        elif note := _note_on_large_error(dataset, claim):
+        elif note := _build_note_on_large_error_estimate(dataset, claim):
             notes[len(rows)] = note
         changed = verdict not in (claim.expected, NOT_APPLICABLE_VERDICT)
         about = claim.id, claim.statement, claim.source, claim.relation, claim.published, computed

@@ -27,7 +27,7 @@ def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
     Study
         Study with the rig.
     """
-    base, axes, every = RigAxes.convert_scene_and_axes_to_rig(rig, study.base, study.axes)
+    base, axes, every = RigAxes.convert_scene_and_axes_to_rig_units(rig, study.base, study.axes)
     reductions = [
         _convert_reduction_range_to_rig_units(each, every.get(getattr(each, "on", "")))
         for each in study.reductions

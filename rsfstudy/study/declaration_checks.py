@@ -341,7 +341,7 @@ def build_unknown_name_error(
     InvalidValue
         Error to raise.
     """
-    remedy = SceneFields.hint_for_unknown_field(unknown_name)
+    remedy = SceneFields.build_hint_for_unknown_field(unknown_name)
     return InvalidValue(
         argument_name,
         unknown_name,

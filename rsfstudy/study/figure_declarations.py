@@ -16,8 +16,8 @@ import numpy as np
 
 from rsfstudy._deprecation import accept_former_keyword_names, build_getattr_for_former_names
 from rsfstudy.axes import Axis
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.quantities import is_valid_variable_name
 from rsfstudy.study.named_study_index import list_study_names
 
@@ -42,7 +42,7 @@ BUILT_IN_FIGURE_NAMES = frozenset(
 
 
 @accept_former_keyword_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Panel:
     """Panel of a figure, repeated for each point of the axes in ``facet``.
@@ -157,7 +157,7 @@ class Panel:
 
 
 @accept_former_keyword_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Figure:
     """Figure that consists of panels.
@@ -198,7 +198,7 @@ class Figure:
         object.__setattr__(self, "panels", panels)
 
     @property
-    def dimensions(self) -> set[str]:
+    def used_dimension_names(self) -> set[str]:
         """Names of all axes that the panels use."""
         named = (name for p in self.panels for name in (p.x, *p.hue, *p.facet, *p.isel))
         return {name for name in named if isinstance(name, str)}
@@ -302,7 +302,7 @@ def check_is_figure(figure_or_name: Any) -> None:
         a figure of the package.
     """
     if isinstance(figure_or_name, str):
-        Axis.check_storable_text("plot", figure_or_name)
+        Axis.storable_text_checker("plot", figure_or_name)
         return
     if isinstance(figure_or_name, Figure):
         return

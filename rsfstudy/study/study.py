@@ -19,8 +19,11 @@ import numpy as np
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
 from rsfstudy.axes import Axis, AxisPointFieldValues
-from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import (
+    make_methods_raise_rsfstudy_errors,
+    raise_only_rsfstudy_errors,
+)
 from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.measures import Measure
 from rsfstudy.motion import Accuracy, Engine
@@ -67,7 +70,7 @@ _EQUIVALENT_FIELD_BY_FIELD_NAME = {
 
 @accept_former_keyword_names
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """Declaration of a parameter study.
@@ -161,7 +164,7 @@ class Study:
             )
             raise InvalidValue("name", self.name, rule)
         for name in ("title", "summary", "source_file"):
-            Axis.check_storable_text(name, getattr(self, name))
+            Axis.storable_text_checker(name, getattr(self, name))
         check_is_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
@@ -204,7 +207,7 @@ class Study:
                 ) from error
 
     @staticmethod
-    @error_boundary
+    @raise_only_rsfstudy_errors
     def caption(docstring: str | None) -> str:
         r"""Extract the summary of a study from the docstring of its module.
 
@@ -259,7 +262,7 @@ class Study:
     @cached_property
     def all_scene_field_names(self) -> tuple[str, ...]:
         """Names of all scene fields, including fields of user-defined parts."""
-        return tuple(SceneFields.collect_quantities_with_user_parts(self.user_parts.values()))
+        return tuple(SceneFields.map_field_names_to_quantities(self.user_parts.values()))
 
     @cached_property
     def scene_and_rig_field_names(self) -> frozenset[str]:
@@ -302,7 +305,7 @@ class Study:
         )
 
     @property
-    def quantities(self) -> dict[str, Quantity]:
+    def quantities_not_in_vocabulary(self) -> dict[str, Quantity]:
         """Quantities of the measure and of user-defined parts, by name.
 
         The dictionary contains only quantities that are not in the common vocabulary.
@@ -671,20 +674,22 @@ class Study:
             "accuracy": asdict(self.accuracy),
             "reductions": [reduction.describe() for reduction in self.reductions],
             "claims": [claim.describe() for claim in self.claims],
-            "plot": self.figure_name,
+            "plot": self.figure_name_in_declaration,
             "references": list(self.references),
             "overrides": dict(self.overrides),
             **({"laboratory": self.rig.as_dict()} if self.rig else {}),
         }
 
     @property
-    def figure_name(self) -> str:
+    def figure_name_in_declaration(self) -> str:
         """Name of the figure in the declaration of the study."""
         return get_figure_name_for_declaration(self.plot, self.name)
 
     def _repr_html_(self) -> str:
         heading = f"{self.name}: {self.title} ({self.size:,} cells)"
-        return format_study_as_html(heading, self.axes, self.base, self.measure, self.quantities)
+        return format_study_as_html(
+            heading, self.axes, self.base, self.measure, self.quantities_not_in_vocabulary
+        )
 
 
 def _build_axis_rows_of_override(field_name: str, value: Any) -> list[AxisPointFieldValues]:

@@ -50,6 +50,6 @@ def list_user_field_quantities(user_parts: Iterable[UserPart]) -> Iterator[Quant
     """
     return (
         about
-        for name, about in SceneFields.collect_quantities_with_user_parts(user_parts).items()
+        for name, about in SceneFields.map_field_names_to_quantities(user_parts).items()
         if name not in SceneFields.NAMES
     )

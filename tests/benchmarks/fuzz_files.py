@@ -40,7 +40,7 @@ from scipy.io import savemat
 import rsfstudy
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.reductions import LinearFit
-from rsfstudy.referee import external_answers, problem_files
+from rsfstudy.referee import benchmark_problem_files, external_answers
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.storage import dataset_files
 
@@ -125,7 +125,10 @@ def resume_run(path: Path) -> xr.Dataset:
 def answer_record(path: Path) -> Any:
     """Read an answer to a problem of the referee."""
     return external_answers.read_external_answer(
-        path, problem_files.read_problem(problem_files.find_shipped_problem_files()[1])
+        path,
+        benchmark_problem_files.read_problem(
+            benchmark_problem_files.find_shipped_problem_files()[1]
+        ),
     )
 
 
@@ -276,7 +279,7 @@ KINDS = {
     "problem.toml": Kind(
         "problem",
         (
-            problem_files.read_problem,
+            benchmark_problem_files.read_problem,
             command_reader("verify", "{1}/01_answer.csv", "--problem", "{0}"),
         ),
         _TEXT_CHANGES,
@@ -308,9 +311,10 @@ def write_valid_files(place: Path) -> dict[str, Any]:
     savemat(place / "record.mat", {"t": time, "exp": {"x": moved, "mu": stress}}, appendmat=False)
     (place / "record.dat").write_bytes(_xlook(np.full(600, 0.2), moved, stress))
     (place / "protocol.csv").write_text("velocity (um/s),duration (s)\n1,10\n10,20\n0,5\n")
-    shutil.copy(problem_files.find_shipped_problem_files()[1], place / "problem.toml")
+    shutil.copy(benchmark_problem_files.find_shipped_problem_files()[1], place / "problem.toml")
     shutil.copy(
-        problem_files.find_shipped_problem_files()[1].with_suffix(".csv"), place / "01_answer.csv"
+        benchmark_problem_files.find_shipped_problem_files()[1].with_suffix(".csv"),
+        place / "01_answer.csv",
     )
     (place / "cases.csv").write_text("a (1),b_over_a (1)\n0.01,1.5\n0.012,1.6\n0.01,2\n")
     (place / "mine.mplstyle").write_text("font.size: 9\naxes.grid: True\nlines.linewidth: 1.5\n")

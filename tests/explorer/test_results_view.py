@@ -26,10 +26,10 @@ VARIABLE = "critical_velocity_ratio"
 def test_selections_resolve_contradictions(results):
     chosen = complete_plot_selection(results, x="law", second="law", facet="law")
     assert (chosen.x, chosen.second) == ("law", "b_over_a")
-    assert chosen.points == {"stiffness_ratio": 0}
+    assert chosen.point_index_by_dimension == {"stiffness_ratio": 0}
     chosen = complete_plot_selection(results, kind="map", facet="law")
     assert {chosen.x, chosen.second} == {"stiffness_ratio", "b_over_a"}
-    assert (chosen.facet, chosen.points) == ("law", {})
+    assert (chosen.facet, chosen.point_index_by_dimension) == ("law", {})
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,6 @@ MODULE_BY_COMMAND = {
     "events": "events",
     "healing": "healing",
     "explore": "explore",
-    "problems": "problems",
+    "problems": "write_referee_problems",
     "verify": "verify",
 }

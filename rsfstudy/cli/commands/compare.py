@@ -61,7 +61,10 @@ class CompareCommandResult(CommandResult):
         found = self.differences
         if not found.finished_cell_counts[0]:
             return "nothing to compare, because the files have no finished cell in common"
-        wrong = [f"{name} differs beyond error estimates" for name in found.variables_beyond_errors]
+        wrong = [
+            f"{name} differs beyond error estimates"
+            for name in found.variables_differing_beyond_errors
+        ]
         if len(found.differing_statuses):
             from rsfstudy.formatting import format_count_with_noun
 

@@ -13,12 +13,12 @@ import rsfstudy
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_OK, CommandResult, print_result_as_text_or_json
-from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.record_options import (
+from rsfstudy.cli.lab_record_options import (
     collect_record_reading_options,
     make_number_with_units_option,
     record_reading_options,
 )
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 
 if TYPE_CHECKING:
     import xarray as xr

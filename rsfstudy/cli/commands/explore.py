@@ -46,7 +46,7 @@ def explore(command_options: options.CommandOptions) -> int:
             command_options.state,
             port=command_options.port,
             open_browser=not command_options.no_browser,
-            announce_address=_print_explorer_address,
+            address_callback=_print_explorer_address,
         )
     except SignalInterrupt:
         raise

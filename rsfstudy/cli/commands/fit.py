@@ -18,13 +18,13 @@ from rsfstudy.cli.command_results import (
     CommandResult,
     print_result_as_text_or_json,
 )
-from rsfstudy.cli.options import DecoratedFunction
-from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.record_options import (
+from rsfstudy.cli.lab_record_options import (
     collect_record_reading_options,
     make_number_with_units_option,
     record_reading_options,
 )
+from rsfstudy.cli.options import DecoratedFunction
+from rsfstudy.cli.printing import print_line, print_tables_and_sentences
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import Engine
@@ -302,7 +302,7 @@ def _print_loading_steps(record: Record) -> None:
     from rsfstudy.reporting import TextTable
 
     print_line(f"{record.name}: {len(record):,} rows, {len(record.loading_steps)} steps")
-    stressed = any(step.stress_ratio != 1.0 for step in record.loading_steps)
+    stressed = any(step.normal_stress_ratio != 1.0 for step in record.loading_steps)
     rows = [
         {
             "step": str(number),
@@ -319,7 +319,12 @@ def _print_loading_steps(record: Record) -> None:
         print_line(f"and {left} more steps")
 
 
-def _format_normal_stresses_of_step(step: LoadingStep, include_stresses: bool) -> dict[str, str]:
+def _format_normal_stresses_of_step(
+    loading_step: LoadingStep, include_stresses: bool
+) -> dict[str, str]:
     """Format the normal stresses of a step in MPa, if the table shows them."""
-    stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
+    stresses = {
+        "sigma0 (MPa)": loading_step.stress_before,
+        "sigma1 (MPa)": loading_step.stress_after,
+    }
     return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if include_stresses}

@@ -19,8 +19,8 @@ from rsfstudy.cli.command_results import (
     CommandResult,
     print_result_as_text_or_json,
 )
+from rsfstudy.cli.lab_record_options import collect_record_reading_options, record_reading_options
 from rsfstudy.cli.printing import print_line, print_tables_and_sentences
-from rsfstudy.cli.record_options import collect_record_reading_options, record_reading_options
 
 if TYPE_CHECKING:
     import xarray as xr

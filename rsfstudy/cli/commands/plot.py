@@ -11,8 +11,8 @@ from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line
 from rsfstudy.defaults import Defaults
-from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import check_regular_file
 
 
 @click.command(cls=CommandWithOptionsObject)

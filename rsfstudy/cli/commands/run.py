@@ -300,7 +300,7 @@ def _print_study_report(run_outcome: StudyRunOutcome) -> None:
     from rsfstudy.cli.study_results import print_failed_cells, print_study_heading, print_verdicts
     from rsfstudy.reporting import (
         build_reduction_tables_and_sentences,
-        describe_slow_instability_norms,
+        format_note_on_low_instability_norms,
         format_status_counts,
     )
 
@@ -308,7 +308,7 @@ def _print_study_report(run_outcome: StudyRunOutcome) -> None:
     assert run_outcome.verdicts is not None
     dataset = run_outcome.results.dataset
     print_tables_and_sentences(build_reduction_tables_and_sentences(dataset))
-    if slow := describe_slow_instability_norms(dataset):
+    if slow := format_note_on_low_instability_norms(dataset):
         print_line(slow, style="yellow")
     print_study_heading(run_outcome.results)
     print_verdicts(run_outcome.verdicts)

@@ -77,9 +77,11 @@ def simulate(command_options: options.CommandOptions) -> int:
     """
     from rsfstudy.cli.overwrite_checks import check_output_may_be_replaced
     from rsfstudy.execution import build_provenance_attributes
-    from rsfstudy.reporting import is_motion
+    from rsfstudy.reporting import is_motion_dataset
 
-    check_output_may_be_replaced(command_options.output.with_suffix(".nc"), is_motion, "motion")
+    check_output_may_be_replaced(
+        command_options.output.with_suffix(".nc"), is_motion_dataset, "motion"
+    )
     scene, rig = _build_scene_and_rig(command_options)
     duration, accuracy = (
         _parse_dimensionless_duration(command_options.duration, rig),

@@ -51,7 +51,7 @@ class VerifyCommandResult(CommandResult):
 
 def _convert_answer_comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, Any]:
     """Return the entry of the JSON output that describes one answer file."""
-    problem = comparison.problem
+    problem = comparison.benchmark_problem
     index = problem.answer_index_values if problem.answer_index_column_name else None
     return {
         "file": file,
@@ -148,7 +148,7 @@ def _print_verification(result: VerifyCommandResult) -> None:
     from rsfstudy.referee import summarise_answer_comparisons
 
     for file, one in zip(result.answer_files, result.answer_comparisons, strict=True):
-        problem = one.problem
+        problem = one.benchmark_problem
         known = f"reference known to {problem.digits} digits"
         name = f"problem {problem.number}" if problem.number else known
         outcome = "passed" if one.has_required_digits else "not passed"
@@ -175,7 +175,7 @@ def _write_agreement_figure(
     from rsfstudy.plots import draw_agreement, style_context
 
     digits: dict[str, list[tuple[float, float]]] = {}
-    problem, label = answer_comparisons[0].problem, "problem"
+    problem, label = answer_comparisons[0].benchmark_problem, "problem"
     if len(answer_comparisons) == 1 and problem.answer_index_column_name:
         label = (
             f"{problem.answer_index_column_name} "
@@ -186,7 +186,7 @@ def _write_agreement_figure(
             digits[one.quantity_name] = list(zip(problem.answer_index_values, along, strict=True))
     else:
         for number, comparison in enumerate(answer_comparisons, start=1):
-            at = comparison.problem.number or number
+            at = comparison.benchmark_problem.number or number
             for one in comparison.quantity_agreements:
                 digits.setdefault(one.quantity_name, []).append((at, one.agreeing_digits))
     with style_context(command_options.style, command_options.width):

@@ -22,7 +22,7 @@ from rsfstudy.motion.recording import (
     HALF_SAMPLES,
     SAMPLE_INTERPOLATION_COEFFICIENTS,
     SAMPLE_NUMBER_COLUMN,
-    SAMPLES_PER_STEP,
+    SAMPLES_PER_INTEGRATION_STEP,
 )
 from rsfstudy.motion.steppers import order_eight
 
@@ -148,7 +148,7 @@ def interpolate_at_fractional_rows(columns, row_positions, result):
         Output array. Row ``i`` contains the interpolated values of column ``i``. The output array
         may have fewer rows than there are columns.
     """
-    last, weights = columns.shape[1] - 1, np.empty(SAMPLES_PER_STEP + 1)
+    last, weights = columns.shape[1] - 1, np.empty(SAMPLES_PER_INTEGRATION_STEP + 1)
     for i in range(len(row_positions)):
         if not 0.0 <= row_positions[i] <= last:  # The recording may contain NaN.
             result[:, i] = math.nan
@@ -164,16 +164,16 @@ def interpolate_at_fractional_rows(columns, row_positions, result):
                 if share > 0.0:
                     result[c, i] = (1.0 - share) * columns[c, row] + share * columns[c, row + 1]
             continue
-        for k in range(SAMPLES_PER_STEP + 1):
+        for k in range(SAMPLES_PER_INTEGRATION_STEP + 1):
             weights[k] = 0.0
-            for power in range(SAMPLES_PER_STEP, -1, -1):
+            for power in range(SAMPLES_PER_INTEGRATION_STEP, -1, -1):
                 weights[k] = (
                     weights[k] * (part / HALF_SAMPLES - 1.0)
                     + SAMPLE_INTERPOLATION_COEFFICIENTS[power][k]
                 )
         for c in range(len(result)):
             result[c, i] = 0.0
-            for k in range(SAMPLES_PER_STEP + 1):
+            for k in range(SAMPLES_PER_INTEGRATION_STEP + 1):
                 result[c, i] += weights[k] * columns[c, min(begin + k, last)]
 
 

@@ -174,7 +174,7 @@ class NumbaMotionState:
         array_layout.CALL_FORMAT.pack_into(self._bytes, 0, *called_with)
         self.motion_state_array = np.frombuffer(self._bytes, array_layout.MOTION_STATE_DTYPE)
 
-    def get_work_and_table_row_counts(self) -> tuple[int, ...]:
+    def get_evaluation_and_table_row_counts(self) -> tuple[int, ...]:
         """Return the counters of evaluations, steps and table rows.
 
         Returns

@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_overrides
+from rsfstudy._deprecation import add_former_member_names, copy_former_overrides_to_new_names
 from rsfstudy.slider import EquationsOfMotion
 
 #: Return values of ``Stepper.attempt_step`` if no step was taken: the step size is too small, or
@@ -49,7 +49,7 @@ class Stepper(ABC):
     def __init_subclass__(cls) -> None:
         """Add the former names of renamed methods to the subclass."""
         super().__init_subclass__()
-        add_new_names_for_former_overrides(cls)
+        copy_former_overrides_to_new_names(cls)
 
     def __init__(self, systems: tuple[EquationsOfMotion, ...], methods: Mapping[str, str]) -> None:
         self.systems, self.failure = systems, "the step size became too small"

@@ -187,7 +187,7 @@ class SciPyStepper(Stepper):
         self,
         motion: Any,
         workspace: Any,
-        clock_interval: tuple[float, float],
+        independent_variable_interval: tuple[float, float],
         initial_unknowns: np.ndarray,
         **first: float,
     ) -> OdeSolver:
@@ -212,9 +212,9 @@ class SciPyStepper(Stepper):
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             solver = self._methods[motion.regime](
                 rate,
-                clock_interval[0],
+                independent_variable_interval[0],
                 initial_unknowns,
-                clock_interval[1],
+                independent_variable_interval[1],
                 rtol=motion.tolerance,
                 atol=motion.tolerance * scales,
                 max_step=MAX_STEP_LENGTH,

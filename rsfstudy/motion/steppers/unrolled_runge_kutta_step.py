@@ -113,7 +113,7 @@ def _compile_weighted_sum_functions() -> dict[str, Any]:
     return {
         name: _compile_function_from_source(
             name,
-            _generate_weighted_sum_arguments(name),
+            _generate_weighted_sum_argument_code(name),
             [f"return {_generate_weighted_sum_expression(name)}"],
             {},
         )
@@ -123,11 +123,11 @@ def _compile_weighted_sum_functions() -> dict[str, Any]:
 
 def _generate_weighted_sum_call(sum_name: str, unknown_index: int) -> str:
     """Return the source code of a weighted sum for one unknown."""
-    rates = _generate_weighted_sum_arguments(sum_name).split(", ")
+    rates = _generate_weighted_sum_argument_code(sum_name).split(", ")
     return f"{sum_name}({', '.join(f'{rate}_{unknown_index}' for rate in rates)})"
 
 
-def _generate_weighted_sum_arguments(sum_name: str) -> str:
+def _generate_weighted_sum_argument_code(sum_name: str) -> str:
     """Return the source code of the argument list of a weighted sum."""
     return ", ".join(f"k{s}" for s in np.flatnonzero(_RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME[sum_name]))
 

@@ -25,7 +25,7 @@ from rsfstudy.rig.readers.arrays_and_netcdf import (
 from rsfstudy.rig.readers.compressed_files import decompress_file, is_compressed_file
 from rsfstudy.rig.readers.matlab_files import is_matlab_file, read_matlab_file
 from rsfstudy.rig.readers.spreadsheets import is_workbook, read_workbook
-from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
+from rsfstudy.rig.readers.tables_from_files_or_objects import LazyTable, TableSource
 from rsfstudy.rig.readers.tdms_files import is_tdms_file, read_tdms_file
 from rsfstudy.rig.readers.text_files import is_text_file, read_text_file
 from rsfstudy.rig.readers.unsupported_formats import (

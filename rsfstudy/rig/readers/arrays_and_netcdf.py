@@ -13,7 +13,11 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import RECORD_COLUMNS, Record
-from rsfstudy.rig.readers.table_sources import LazyTable, TableSource, append_units_to_headings
+from rsfstudy.rig.readers.tables_from_files_or_objects import (
+    LazyTable,
+    TableSource,
+    append_units_to_headings,
+)
 from rsfstudy.rig.table_columns import Column
 
 _NETCDF_SIGNATURES = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n")

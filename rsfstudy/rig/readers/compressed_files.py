@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from rsfstudy.errors import DataError
-from rsfstudy.rig.readers.table_sources import TableSource
+from rsfstudy.rig.readers.tables_from_files_or_objects import TableSource
 
 #: Functions that open compressed files, indexed by the first bytes of the file.
 _OPEN_FUNCTION_BY_FILE_SIGNATURE: dict[bytes, Callable[[Any], Any]] = {

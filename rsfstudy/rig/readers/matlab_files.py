@@ -10,9 +10,13 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.readers.matlab_elements import read_numeric_arrays
+from rsfstudy.rig.readers.matlab_data_elements import read_numeric_arrays
 from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
-from rsfstudy.rig.readers.table_sources import LazyTable, TableSource, build_table_of_arrays
+from rsfstudy.rig.readers.tables_from_files_or_objects import (
+    LazyTable,
+    TableSource,
+    build_table_of_arrays,
+)
 
 _SIGNATURE_5, _SIGNATURE_7_3 = b"MATLAB 5.0", b"MATLAB 7.3"
 #: Maximum depth of nested structures, and maximum number of columns of a matrix.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rsfstudy.errors import DataError
-from rsfstudy.rig.readers.table_sources import TableSource
+from rsfstudy.rig.readers.tables_from_files_or_objects import TableSource
 
 
 def build_missing_library_error(

@@ -13,7 +13,7 @@ import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
-from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
+from rsfstudy.rig.readers.tables_from_files_or_objects import LazyTable, TableSource
 from rsfstudy.rig.readers.text_layout import detect_text_layout
 from rsfstudy.rig.table_columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.units import parse_number

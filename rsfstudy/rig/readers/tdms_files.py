@@ -11,7 +11,7 @@ import numpy as np
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.readers.missing_libraries import build_missing_library_error
-from rsfstudy.rig.readers.table_sources import (
+from rsfstudy.rig.readers.tables_from_files_or_objects import (
     LazyTable,
     TableSource,
     append_units_to_headings,

@@ -13,7 +13,7 @@ import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.formatting import format_count_with_noun
-from rsfstudy.rig.readers.table_sources import LazyTable, TableSource
+from rsfstudy.rig.readers.tables_from_files_or_objects import LazyTable, TableSource
 from rsfstudy.rig.readers.text_layout import (
     COMMENT_LINE_PREFIXES,
     WHITESPACE_DELIMITER,

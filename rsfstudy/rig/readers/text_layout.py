@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.readers.table_sources import append_units_to_headings
+from rsfstudy.rig.readers.tables_from_files_or_objects import append_units_to_headings
 from rsfstudy.rig.units import find_si_factor_and_exponents, parse_number
 
 #: Delimiter of files in which one or more blanks separate the columns.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NoReturn
 
 from rsfstudy.errors import DataError
-from rsfstudy.rig.readers.table_sources import TableSource
+from rsfstudy.rig.readers.tables_from_files_or_objects import TableSource
 
 _ADVICE_TO_READ_IN_PYTHON = "Read the file in Python, and pass a mapping of arrays or a DataFrame"
 _ADVICE_TO_EXPORT_AS_CSV = "Export the table as a CSV file"

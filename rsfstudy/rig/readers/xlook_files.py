@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from rsfstudy.errors import DataError
-from rsfstudy.rig.readers.table_sources import LazyTable, TableSource, append_units_to_headings
+from rsfstudy.rig.readers.tables_from_files_or_objects import (
+    LazyTable,
+    TableSource,
+    append_units_to_headings,
+)
 from rsfstudy.rig.table_columns import Column
 
 #: Layout of xlook files. The constants are the size of the file header in bytes, the size of each

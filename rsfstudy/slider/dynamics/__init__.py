@@ -31,7 +31,8 @@ class Dynamics(Part):
       due to stress. The function ``growth(state, rates, x, g, p)`` returns the derivative of
       :math:`x = \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and
       the states ``psis``, and ``rates`` contains the derivatives of ``state``.
-    - ``build_rupture_rate_function(friction)`` is optional. The returned function ``rate(state,
+    - ``build_rate_function_for_ruptures(friction)`` is optional. The returned function
+    ``rate(state,
       p)`` contains the inertial equations of motion, which are integrated during ruptures. The
       function ``rate`` returns derivatives with respect to inertial time. The unknowns are the
       spring stress f, the logarithm x = ln(V/V_*), the frictional stress g, and all states except
@@ -52,7 +53,7 @@ class Dynamics(Part):
     regime_name: ClassVar[str]
     received_quantity_names = frozenset(QUANTITIES_A_PART_MAY_NEED)
     build_slip_rate_functions: ClassVar[NumericFunction]
-    build_rupture_rate_function: ClassVar[NumericFunction | None] = None
+    build_rate_function_for_ruptures: ClassVar[NumericFunction | None] = None
     #: True if slip may reverse in scenes with the regularised friction law.
     allows_reversed_slip: ClassVar[bool] = False
 

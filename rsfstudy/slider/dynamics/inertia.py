@@ -2,7 +2,7 @@
 
 If inertia is weak, the motion follows the slow manifold of the inertial equations of motion
 (``build_slow_manifold_slip_rate_functions``). During ruptures, the inertial equations of motion are
-integrated (``build_rupture_rate_function``).
+integrated (``build_rate_function_for_ruptures``).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import FrictionFunctions
+from rsfstudy.slider.integration_path_length import compute_velocity_ratios
 from rsfstudy.slider.parameter_layout import (
     DYNAMICS,
     LOAD_VELOCITY,
@@ -22,9 +23,8 @@ from rsfstudy.slider.parameter_layout import (
     A,
 )
 from rsfstudy.slider.parts import FloatTuple, NumericFunction, flag
-from rsfstudy.slider.path_length import compute_velocity_ratios
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.state_functions import build_function_adding_step_to_states
+from rsfstudy.slider.state_variable_functions import build_function_adding_state_changes
 
 #: Upper limit of the rates of the unknowns per unit of inertial time. Larger rates occur only in
 #: trial steps of the integrator. A motion returns to the slow manifold long before its slip rate
@@ -106,7 +106,7 @@ def build_slow_manifold_slip_rate_functions(
     contribution, spring_stress_rate, ahead = (
         friction_functions.state_contribution_to_friction,
         friction_functions.spring_stress_rate,
-        build_function_adding_step_to_states(friction_functions.state_count),
+        build_function_adding_state_changes(friction_functions.state_count),
     )
 
     def balance(
@@ -127,7 +127,7 @@ def build_slow_manifold_slip_rate_functions(
         The argument for the quasi-static motion is the tuple returned by ``quasi_static_values``.
         """
         x, growing, slope, weight, _shift = alone
-        first = compute_inertial_stress_limited_to_a(weight, growing, p)
+        first = compute_bounded_inertial_stress(weight, growing, p)
         if weight <= NEGLIGIBLE_SECOND_ORDER_WEIGHT:
             return first
         trails = slope * first / p[A]
@@ -141,11 +141,9 @@ def build_slow_manifold_slip_rate_functions(
             spring_stress + DIFFERENCE_STEP * loading, ahead(psis, changes, DIFFERENCE_STEP), p
         )
         trails_ahead = (
-            slope_ahead
-            * compute_inertial_stress_limited_to_a(weight_ahead, growing_ahead, p)
-            / p[A]
+            slope_ahead * compute_bounded_inertial_stress(weight_ahead, growing_ahead, p) / p[A]
         )
-        return compute_inertial_stress_limited_to_a(
+        return compute_bounded_inertial_stress(
             compute_inertia_weight(slowed, slower, p),
             growing - (trails_ahead - trails) / DIFFERENCE_STEP,
             p,
@@ -200,7 +198,7 @@ def build_slow_manifold_slip_rate_functions(
     return balance, growth
 
 
-def compute_inertial_stress_limited_to_a(
+def compute_bounded_inertial_stress(
     inertia_weight: float, log_slip_rate_derivative: float, p: FloatTuple
 ) -> float:
     r"""Compute the bounded stress that accelerates the mass.
@@ -258,7 +256,7 @@ def compute_inertia_weight(
     return p[STIFFNESS] / p[A] * norm * (norm + load)
 
 
-def build_rupture_rate_function(friction_functions: FrictionFunctions) -> NumericFunction:
+def build_rate_function_for_ruptures(friction_functions: FrictionFunctions) -> NumericFunction:
     r"""Return the rate function of the inertial equations of motion.
 
     The unknowns are :math:`f`, :math:`x = \ln(V/V_*)`, :math:`g` and all states except the first.
@@ -360,7 +358,7 @@ class Inertia(Dynamics):
     selecting_field_name = "inertia"
     regime_name = "slow_manifold"
     build_slip_rate_functions = staticmethod(build_slow_manifold_slip_rate_functions)
-    build_rupture_rate_function = staticmethod(build_rupture_rate_function)
+    build_rate_function_for_ruptures = staticmethod(build_rate_function_for_ruptures)
 
     @property
     def effects(self) -> tuple[str, ...]:

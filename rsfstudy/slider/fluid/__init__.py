@@ -57,7 +57,7 @@ class Fluid(Part):
     ['porosity', 'pore_pressure']
     """
 
-    members_derived_from_equations = ("highest_pressure",)
+    members_derived_from_equations = ("compute_pore_pressure_upper_bound",)
     members_defining_equations = frozenset({"auxiliary_rates", "parameter_values"})
     received_quantity_names = frozenset({SLIP_RATE, PORE_PRESSURE})
 
@@ -66,7 +66,7 @@ class Fluid(Part):
         """Undrained pore pressure in sigma_* for a temperature rise of 1."""
         return 0.0
 
-    def highest_pressure(self, log_slip_rate: float, states: FloatTuple) -> float:
+    def compute_pore_pressure_upper_bound(self, log_slip_rate: float, states: FloatTuple) -> float:
         r"""Compute an upper bound on the future pore pressure.
 
         Parameters

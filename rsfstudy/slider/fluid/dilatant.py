@@ -212,14 +212,15 @@ class DilatantFluid(Fluid):
                 "drainage", rule, "Pass stiffness instead of stiffness_ratio, or increase drainage."
             )
 
-    def highest_pressure(self, log_slip_rate: float, states: FloatTuple) -> float:
+    def compute_pore_pressure_upper_bound(self, log_slip_rate: float, states: FloatTuple) -> float:
         r"""Compute an upper bound on the future pore pressure.
 
-        See ``Fluid.highest_pressure``. The upper bound follows from the drainage rate and from the
-        largest rate at which pores can close. The closing rate is :math:`V (\varphi - \varphi_0 -
-        \epsilon \ln(V/V_*)) D_c/L_\varphi`. If the dilatancy is negative, the porosity may first
-        increase while slip is slow. The closing rate is then largest when the slip rate increases
-        again. The upper bound therefore includes the steady porosity at the lowest slip rate.
+        See ``Fluid.compute_pore_pressure_upper_bound``. The upper bound follows from the drainage
+        rate and from the largest rate at which pores can close. The closing rate is :math:`V
+        (\varphi - \varphi_0 - \epsilon \ln(V/V_*)) D_c/L_\varphi`. If the dilatancy is negative,
+        the porosity may first increase while slip is slow. The closing rate is then largest when
+        the slip rate increases again. The upper bound therefore includes the steady porosity at the
+        lowest slip rate.
         """
         closing = max(
             states[0] - self.dilatancy * log_slip_rate,

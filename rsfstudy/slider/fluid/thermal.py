@@ -153,14 +153,14 @@ class ThermalFluid(Fluid):
             else return_zero_steady_pore_pressure
         )
 
-    def highest_pressure(self, log_slip_rate: float, states: FloatTuple) -> float:
+    def compute_pore_pressure_upper_bound(self, log_slip_rate: float, states: FloatTuple) -> float:
         """Compute an upper bound on the future pore pressure without heating.
 
-        See ``Fluid.highest_pressure``.
+        See ``Fluid.compute_pore_pressure_upper_bound``.
         """
         if not self.dilatancy:
             return max(states[-1], 0.0)
-        return DilatantFluid.highest_pressure(self, log_slip_rate, states)  # type: ignore[arg-type]
+        return DilatantFluid.compute_pore_pressure_upper_bound(self, log_slip_rate, states)  # type: ignore[arg-type]
 
     @property
     def pressurisation_factor(self) -> float:

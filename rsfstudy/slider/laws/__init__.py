@@ -158,7 +158,7 @@ class LawBase(Part):
     )
 
     members_derived_from_equations = (
-        "has_closed_orbits",
+        "has_closed_orbits_at_critical_stiffness",
         "lacks_characteristic_slip_rate",
         "relaxation",
     )
@@ -170,7 +170,7 @@ class LawBase(Part):
     #: the motion is quasi-static and stress does not affect the state. Set this attribute to True
     #: only if the derivative of the evolution with respect to the state is a linear function of the
     #: evolution.
-    has_closed_orbits: ClassVar[bool] = False
+    has_closed_orbits_at_critical_stiffness: ClassVar[bool] = False
     #: True if Theta = b ln(theta/theta_*), so that theta can be computed from the state variable.
     has_logarithmic_state: ClassVar[bool] = True
     #: True if the law contains no characteristic slip rate, so the choice of V_* is arbitrary.
@@ -226,7 +226,7 @@ class LawBase(Part):
         return ()
 
     @property
-    def state_change_per_log_rate_over_a(self) -> float:
+    def steady_state_change_per_log_rate_over_a(self) -> float:
         """Magnitude of the steady-state change per unit change of ln V, divided by a.
 
         The value is always positive.
@@ -300,7 +300,7 @@ class LawBase(Part):
                 "class."
             )
             raise self.build_field_error("stress_dependence", rule, remedy)
-        pressed = source.unknowns and not loading.has_load_point_unknown
+        pressed = source.unknowns and not loading.adds_load_point_displacement_unknown
         slot_name = "fluid" if source is fluid else "loading"
         if scene.parts.temperature.unknowns:
             pressed, source, slot_name = True, scene.parts.temperature, "temperature"

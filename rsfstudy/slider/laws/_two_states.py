@@ -102,7 +102,7 @@ class TwoStateLaw(LawBase):
         return self.b1_over_a + self.b2_over_a
 
     @property
-    def state_change_per_log_rate_over_a(self) -> float:
+    def steady_state_change_per_log_rate_over_a(self) -> float:
         """Sum of the magnitudes of both evolution effects, divided by a."""
         return abs(self.b1_over_a) + abs(self.b2_over_a)
 
@@ -113,7 +113,7 @@ class TwoStateLaw(LawBase):
         parameter b and its share of the effect of stress. The last value is :math:`L_1/L_2`, the
         inverse of ``length_ratio``.
         """
-        both, size = (self.b1_over_a, self.b2_over_a), self.state_change_per_log_rate_over_a
+        both, size = (self.b1_over_a, self.b2_over_a), self.steady_state_change_per_log_rate_over_a
         # If b is zero for both states, the shares are undefined. The method ``check`` rejects this
         # case.
         shares = (abs(b) / size if size else 0.5 for b in both)
@@ -141,7 +141,7 @@ class TwoStateLaw(LawBase):
         ``stiffness_ratio``.
         """
         super().check(scene)
-        if not self.state_change_per_log_rate_over_a:
+        if not self.steady_state_change_per_log_rate_over_a:
             rule = (
                 "must not be 0 if b1_over_a is 0, because otherwise no state variable "
                 "affects friction"

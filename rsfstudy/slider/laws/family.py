@@ -65,7 +65,9 @@ class SlipToSlownessLaw(Law):
     name = "family"
     evolution = staticmethod(compute_state_evolution_per_slip)
     lacks_characteristic_slip_rate = True
-    has_closed_orbits = True  # The derivative dh/du = -(1 + eps h) is linear in h.
+    has_closed_orbits_at_critical_stiffness = (
+        True  # The derivative dh/du = -(1 + eps h) is linear in h.
+    )
 
     def relaxation(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.

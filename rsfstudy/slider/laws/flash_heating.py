@@ -15,7 +15,7 @@ from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def compute_steady_state_without_shift(log_slip_rate: float, p: FloatTuple) -> float:
+def compute_steady_state_variable(log_slip_rate: float, p: FloatTuple) -> float:
     r"""Compute the state variable in steady sliding.
 
     Parameters
@@ -70,7 +70,7 @@ def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: Floa
     float
         Rate :math:`D_c \, d\Theta/d\delta = -(\Theta - \Theta_{\mathrm{ss}})`.
     """
-    return compute_steady_state_without_shift(log_slip_rate, p) - state
+    return compute_steady_state_variable(log_slip_rate, p) - state
 
 
 def compute_steady_states(
@@ -92,7 +92,7 @@ def compute_steady_states(
     tuple of float
         State :math:`\Psi`.
     """
-    return (stress_induced_state_shift + compute_steady_state_without_shift(log_slip_rate, p),)
+    return (stress_induced_state_shift + compute_steady_state_variable(log_slip_rate, p),)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -52,7 +52,7 @@ def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: Floa
     )
 
 
-def compute_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
+def compute_state_minus_steady_state_over_b(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     See ``LawBase.relaxation`` for the arguments.
@@ -79,5 +79,5 @@ class PerrinRiceZhengLaw(Law):
 
     name = "perrin_rice_zheng"
     evolution = staticmethod(compute_state_evolution_per_slip)
-    relaxation = staticmethod(compute_relaxation_after_velocity_step)
+    relaxation = staticmethod(compute_state_minus_steady_state_over_b)
     lacks_characteristic_slip_rate = True

@@ -3,7 +3,7 @@
 Each module of this package defines one loading history. The function ``discover_parts`` finds the
 modules automatically. A loading history is a sequence of segments. Before the first segment, the
 slider slides steadily at the reference velocity :math:`V_*`. The base classes are ``Loading`` and
-``LoadingWithFinalLoadVelocity``.
+``LoadingWithFinalVelocityBase``.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.slider.parts import NON_NEGATIVE, FloatTuple, Part, discover_parts, number
 from rsfstudy.slider.quantities_required_by_parts import SLIP_RATE
 from rsfstudy.slider.scene_view import SceneView
@@ -24,7 +24,7 @@ from rsfstudy.slider.scene_view import SceneView
 MIN_SEGMENT_DURATION = 1e-16
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 class Segment(NamedTuple):
     r"""Segment of a loading history.
 
@@ -75,7 +75,7 @@ class Segment(NamedTuple):
 
 
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Loading(Part):
     r"""Base class of the loading histories.
@@ -115,7 +115,7 @@ class Loading(Part):
     #: unknown is a decrease in normal stress. The displacement of the load point relative to its
     #: mean motion causes the shear stress. The shear stress equals the last unknown minus the third
     #: element of ``parameter_values``.
-    has_load_point_unknown: ClassVar[bool] = False
+    adds_load_point_displacement_unknown: ClassVar[bool] = False
     received_quantity_names = frozenset({SLIP_RATE})
     #: True if the loading decreases the effective normal stress by an increase in pore pressure. In
     #: a scene whose fluid has unknowns, the loading increases the pore pressure around the fault.
@@ -177,7 +177,7 @@ class Loading(Part):
     @property
     def adds_normal_stress_unknowns(self) -> bool:
         """True if the loading has unknowns that change normal stress."""
-        return bool(self.unknowns) and not self.has_load_point_unknown
+        return bool(self.unknowns) and not self.adds_load_point_displacement_unknown
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -237,7 +237,7 @@ class Loading(Part):
         return rows
 
     @property
-    def jump_mask(self) -> Any:
+    def jump_at_segment_start_mask(self) -> Any:
         """True for each segment that starts with a jump of the loading.
 
         A jump of the loading is a sudden change in load point displacement or normal stress. The
@@ -316,7 +316,7 @@ def declare_load_velocity_field() -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadingWithFinalLoadVelocity(Loading):
+class LoadingWithFinalVelocityBase(Loading):
     """Base class of the loadings with a field for the load point velocity.
 
     The load point velocity applies to the whole loading or to its last segment. The default is the

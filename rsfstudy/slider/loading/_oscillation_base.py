@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from rsfstudy.slider.loading import (
     Loading,
-    LoadingWithFinalLoadVelocity,
+    LoadingWithFinalVelocityBase,
     Segment,
     declare_load_velocity_field,
 )
@@ -63,7 +63,7 @@ def return_zero_steady_oscillation(log_slip_rate: float, p: FloatTuple) -> Float
 
 
 @dataclass(frozen=True, kw_only=True)
-class OscillationBase(LoadingWithFinalLoadVelocity):
+class OscillationBase(LoadingWithFinalVelocityBase):
     r"""Base class of the oscillations, with two harmonic unknowns.
 
     Parameters
@@ -164,7 +164,7 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
         return (*before, steady._replace(duration=self.oscillation_duration), *after)
 
     @property
-    def jump_mask(self) -> list[bool]:
+    def jump_at_segment_start_mask(self) -> list[bool]:
         """True for every segment.
 
         The loading may change suddenly at the start of the oscillation, because the initial phase

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.loading import (
-    LoadingWithFinalLoadVelocity,
+    LoadingWithFinalVelocityBase,
     Segment,
     declare_load_velocity_field,
 )
@@ -19,7 +19,7 @@ from rsfstudy.slider.parts import POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def compute_remaining_normal_stress_rates(
+def compute_remaining_stress_change_rates(
     log_slip_rate: float, states: FloatTuple, slip_per_independent_variable: float, p: FloatTuple
 ) -> FloatTuple:
     r"""Compute the rate of the remaining normal stress change of a ramp.
@@ -43,7 +43,7 @@ def compute_remaining_normal_stress_rates(
     )
 
 
-def return_zero_remaining_normal_stress(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
+def return_zero_remaining_stress_change(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
     r"""Return the remaining normal stress change in steady sliding.
 
     The remaining change is zero, because normal stress is constant in steady sliding.
@@ -52,7 +52,7 @@ def return_zero_remaining_normal_stress(log_slip_rate: float, p: FloatTuple) -> 
 
 
 @dataclass(frozen=True, kw_only=True)
-class NormalStressRamp(LoadingWithFinalLoadVelocity):
+class NormalStressRamp(LoadingWithFinalVelocityBase):
     r"""Ramp of imposed normal stress at a steady load point velocity.
 
     The slider slides steadily until the ramp starts. If the driving stress is inclined to the
@@ -102,8 +102,8 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
         Quantity("ramp_left", "$P$", "1", "remaining change of imposed normal stress", "sigma_*"),
     )
     of_pressure = False
-    auxiliary_rates = staticmethod(compute_remaining_normal_stress_rates)
-    auxiliary_steady_states = staticmethod(return_zero_remaining_normal_stress)
+    auxiliary_rates = staticmethod(compute_remaining_stress_change_rates)
+    auxiliary_steady_states = staticmethod(return_zero_remaining_stress_change)
 
     @property
     def segments(self) -> tuple[Segment, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.loading import (
-    LoadingWithFinalLoadVelocity,
+    LoadingWithFinalVelocityBase,
     Segment,
     declare_load_velocity_field,
 )
@@ -13,7 +13,7 @@ from rsfstudy.slider.parts import NON_NEGATIVE, number
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlideHoldSlide(LoadingWithFinalLoadVelocity):
+class SlideHoldSlide(LoadingWithFinalVelocityBase):
     r"""Hold of the load point, followed by reloading.
 
     Parameters

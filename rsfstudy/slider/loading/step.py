@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.loading import (
-    LoadingWithFinalLoadVelocity,
+    LoadingWithFinalVelocityBase,
     Segment,
     declare_load_velocity_field,
 )
@@ -14,7 +14,7 @@ from rsfstudy.slider.scene_caching import cached_attribute
 
 
 @dataclass(frozen=True, kw_only=True)
-class StepLoading(LoadingWithFinalLoadVelocity):
+class StepLoading(LoadingWithFinalVelocityBase):
     r"""Step of load velocity, load displacement or normal stress at time zero.
 
     A displacement step changes the spring stress by :math:`k \Delta\delta_0`. You can combine steps

@@ -55,7 +55,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
 
     name = "velocity_oscillation"
     selecting_field_name = "velocity_oscillation"
-    has_load_point_unknown = True
+    adds_load_point_displacement_unknown = True
     unknowns = (
         Quantity(
             "load_point_behind",

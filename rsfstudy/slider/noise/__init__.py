@@ -25,8 +25,8 @@ from rsfstudy.slider.scene_view import SceneView
 class Noise(Part):
     r"""Base class of the noise that is added to the loading.
 
-    A subclass sets ``is_active`` to True and defines the methods ``iterate_segment_table_blocks``
-    and ``changes_normal_stress``.
+    A subclass sets ``is_active`` to True and defines the methods
+    ``iterate_noisy_loading_segment_blocks`` and ``changes_normal_stress``.
 
     Examples
     --------
@@ -40,10 +40,10 @@ class Noise(Part):
 
     #: True if the noise changes the motion.
     is_active: ClassVar[bool] = False
-    has_load_point_unknown: ClassVar[bool] = False
+    adds_load_point_displacement_unknown: ClassVar[bool] = False
     of_pressure: ClassVar[bool] = False
-    auxiliary_rates = staticmethod(ramp.compute_remaining_normal_stress_rates)
-    auxiliary_steady_states = staticmethod(ramp.return_zero_remaining_normal_stress)
+    auxiliary_rates = staticmethod(ramp.compute_remaining_stress_change_rates)
+    auxiliary_steady_states = staticmethod(ramp.return_zero_remaining_stress_change)
 
     @property
     def changes_normal_stress(self) -> bool:
@@ -79,7 +79,7 @@ class Noise(Part):
         """
         return (0.0,) * len(self.unknowns)
 
-    def iterate_segment_table_blocks(
+    def iterate_noisy_loading_segment_blocks(
         self, start_time: float, end_time: float, load_velocity: float
     ) -> Iterator[Any]:
         """Yield the segment table of the noise in blocks.

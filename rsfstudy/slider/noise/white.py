@@ -145,17 +145,17 @@ class WhiteNoise(Noise):
         """
         return noise_paths.UnitNoisePath(int(self.noise_seed), stream_number)
 
-    def iterate_segment_table_blocks(
+    def iterate_noisy_loading_segment_blocks(
         self, start_time: float, end_time: float, load_velocity: float
     ) -> Iterator[Any]:
         """Yield the segment table of the noise in blocks.
 
-        See ``Noise.iterate_segment_table_blocks``.
+        See ``Noise.iterate_noisy_loading_segment_blocks``.
         """
         shear = self.build_unit_noise_path(0), self.stress_noise
         normal = (
             (self.build_unit_noise_path(1), self.normal_stress_noise) if self.unknowns else None
         )
-        return noise_paths.iterate_segment_table_blocks(
+        return noise_paths.iterate_noisy_loading_segment_blocks(
             start_time, end_time, load_velocity, self.noise_interval, shear, normal
         )

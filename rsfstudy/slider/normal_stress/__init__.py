@@ -40,7 +40,7 @@ class NormalStress(Part):
     members_derived_from_equations = (
         "depends_on_shear_stress",
         "coupling",
-        "min_frictional_stress",
+        "compute_frictional_stress_lower_bound",
     )
     members_defining_equations = frozenset({"normal_stress", "state_effect", "parameter_values"})
     received_quantity_names = frozenset({SHEAR_STRESS})
@@ -72,7 +72,7 @@ class NormalStress(Part):
         """
         return None
 
-    def min_frictional_stress(self, scene: SceneView) -> float:
+    def compute_frictional_stress_lower_bound(self, scene: SceneView) -> float:
         r"""Compute the frictional stress at which normal stress vanishes.
 
         Parameters

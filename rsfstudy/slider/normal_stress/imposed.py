@@ -13,7 +13,7 @@ from rsfstudy.slider.parts import FloatTuple
 from rsfstudy.slider.scene_view import SceneView
 
 
-def compute_imposed_normal_stress_excess(
+def compute_normal_stress_minus_reference(
     frictional_stress: float, p: FloatTuple
 ) -> tuple[float, float]:
     r"""Compute the imposed normal stress.
@@ -48,7 +48,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
         "when normal stress does not depend on shear stress",
         "set normal_stress='variable'",
     )
-    normal_stress = staticmethod(compute_imposed_normal_stress_excess)
+    normal_stress = staticmethod(compute_normal_stress_minus_reference)
     depends_on_shear_stress = False
 
     @property

@@ -20,7 +20,7 @@ from rsfstudy.slider.parts import POSITIVE, FloatTuple, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def compute_coupled_normal_stress_excess(
+def compute_normal_stress_minus_reference(
     frictional_stress: float, p: FloatTuple
 ) -> tuple[float, float]:
     r"""Compute the normal stress under an inclined driving stress.
@@ -85,7 +85,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
     )
 
     name = "variable"
-    normal_stress = staticmethod(compute_coupled_normal_stress_excess)
+    normal_stress = staticmethod(compute_normal_stress_minus_reference)
 
     @property
     def cot_phi(self) -> float:
@@ -112,10 +112,10 @@ class VariableNormalStress(NormalStressWithStateEffect):
         """
         return self.alpha, self.cot_phi
 
-    def min_frictional_stress(self, scene: SceneView) -> float:
+    def compute_frictional_stress_lower_bound(self, scene: SceneView) -> float:
         """Compute the frictional stress at which normal stress vanishes.
 
-        See ``NormalStress.min_frictional_stress``.
+        See ``NormalStress.compute_frictional_stress_lower_bound``.
         """
         return -(1.0 + scene.imposed_normal_stress) / self.cot_phi
 

@@ -79,7 +79,7 @@ class Temperature(Part):
         return ("temperature_rate",) if cls.unknowns else ()
 
     @property
-    def activation_terms(self) -> tuple[float, float]:
+    def dimensionless_activation_energies(self) -> tuple[float, float]:
         """Activation terms of the direct effect and of the evolution effect.
 
         In the base class, friction does not depend on temperature, and both terms are zero.

@@ -148,14 +148,17 @@ class ShearHeating(Temperature):
     temperature_rate = staticmethod(compute_temperature_rate)
 
     @property
-    def activation_terms(self) -> tuple[float, float]:
+    def dimensionless_activation_energies(self) -> tuple[float, float]:
         """Activation terms of the direct effect and of the evolution effect."""
         return self.direct_activation, self.evolution_activation
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the active physical effects of the part."""
-        return ("shear_heating", *("thermal_activation",) * any(self.activation_terms))
+        return (
+            "shear_heating",
+            *("thermal_activation",) * any(self.dimensionless_activation_energies),
+        )
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
         r"""Return the parameters of ``compute_temperature_rate``.
@@ -185,7 +188,7 @@ class ShearHeating(Temperature):
         See ``Part.check``. The activation terms require a law with one state. If the friction
         depends on temperature, the temperature of the surroundings must be positive.
         """
-        if any(self.activation_terms):
+        if any(self.dimensionless_activation_energies):
             law = scene.parts.law
             if law.state_count > 1:
                 name = "direct_activation" if self.direct_activation else "evolution_activation"

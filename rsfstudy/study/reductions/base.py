@@ -15,9 +15,12 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_overrides
-from rsfstudy.error_boundary import ConstructorKeywordCheckMixin, wrap_methods_in_error_boundary
+from rsfstudy._deprecation import add_former_member_names, copy_former_overrides_to_new_names
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import (
+    ConstructorKeywordCheckMixin,
+    make_methods_raise_rsfstudy_errors,
+)
 from rsfstudy.quantities import Quantity
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
@@ -31,7 +34,7 @@ DerivativesAndCellCoordinates = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 #: Names of the reduction fields that determine the units of a result, by the suffix of the result
 #: name. Each field contains the name of a variable, and the units of the result are derived from
 #: the units of these variables.
-UnitFieldNamesByResultSuffix = Mapping[str, Sequence[str]]
+FieldsDeterminingUnitsByResultSuffix = Mapping[str, Sequence[str]]
 
 #: Value of the attribute ``comment`` of propagated errors.
 PROPAGATED_ERROR_COMMENT = (
@@ -47,7 +50,7 @@ COORDINATE_RANGE_RTOL = 1e-9
 
 
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Reduction(ConstructorKeywordCheckMixin):
     """Base class of all reductions.
@@ -102,7 +105,7 @@ class Reduction(ConstructorKeywordCheckMixin):
     #: name of the result. For ``("of",)``, the result has the units of the variable that the field
     #: ``of`` names. For ``("of", "on")``, the result has the units of the first variable divided by
     #: the units of the second variable. Results without an entry are dimensionless.
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
     #: True if the reduction also uses failed cells. All other reductions reject failed cells.
     uses_failed_cells: ClassVar[bool] = False
 
@@ -112,7 +115,7 @@ class Reduction(ConstructorKeywordCheckMixin):
     def __init_subclass__(cls) -> None:
         """Set the default ``kind`` of a subclass and accept former member names."""
         super().__init_subclass__()
-        add_new_names_for_former_overrides(cls)
+        copy_former_overrides_to_new_names(cls)
         if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
             cls.kind = cls.__name__
 
@@ -418,7 +421,8 @@ def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity
     return {
         str(name): Quantity(
             str(name),
-            str(values.attrs.get("symbol", "")) or _symbol_in_other_units(str(name), values.attrs),
+            str(values.attrs.get("symbol", ""))
+            or _find_symbol_after_unit_conversion(str(name), values.attrs),
             str(values.attrs.get("units", "1")),
             str(values.attrs["long_name"]),
             str(values.attrs.get("scale", "")),
@@ -428,7 +432,9 @@ def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity
     }
 
 
-def _symbol_in_other_units(variable_name: str, variable_attributes: Mapping[Any, Any]) -> str:
+def _find_symbol_after_unit_conversion(
+    variable_name: str, variable_attributes: Mapping[Any, Any]
+) -> str:
     """Return the symbol of a vocabulary quantity that is stored in other units.
 
     The symbol of a normalised quantity is a quotient, which is valid only without units.

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.quantities import Quantity
 from rsfstudy.study.reductions._level_crossing import (
     MIN_SAMPLES_FOR_CROSSING_SEARCH,
@@ -24,8 +24,8 @@ from rsfstudy.study.reductions._level_crossing import (
 )
 from rsfstudy.study.reductions.base import (
     DerivativesAndCellCoordinates,
+    FieldsDeterminingUnitsByResultSuffix,
     Reduction,
-    UnitFieldNamesByResultSuffix,
     depends_on_failed_cells,
     find_dimension_of_coordinate,
 )
@@ -34,7 +34,7 @@ from rsfstudy.study.reductions.base import (
 _LOG_STEP_FOR_FINITE_DIFFERENCES = 1e-6
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Boundary(Reduction):
     """Boundary between cells with values below and above a threshold.
@@ -75,7 +75,7 @@ class Boundary(Reduction):
     on: str = ""
     level: float = 0.5
     kind: ClassVar[str] = "boundary"
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("on",)}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Find the boundary for each point along the other dimensions.
@@ -160,7 +160,7 @@ class Boundary(Reduction):
         return *ends, float(changes.size)
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Inverse(Reduction):
     """Coordinate value at which a monotone variable reaches a level.
@@ -212,7 +212,7 @@ class Inverse(Reduction):
     uncertainty: float | Mapping[str, float] = 0.0
     along: str = ""
     kind: ClassVar[str] = "inverse"
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("on",)}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("on",)}
 
     @property
     def quantities(self) -> Sequence[Quantity]:

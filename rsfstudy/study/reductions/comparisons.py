@@ -13,13 +13,13 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.slider import CLOSED_FORMS
 from rsfstudy.study.reductions.base import (
     DerivativesAndCellCoordinates,
+    FieldsDeterminingUnitsByResultSuffix,
     Reduction,
-    UnitFieldNamesByResultSuffix,
     depends_on_failed_cells,
     find_dimension_of_coordinate,
     select_coordinate_range,
@@ -28,7 +28,7 @@ from rsfstudy.study.reductions.base import (
 DerivativesWrtValueAndReference = tuple[xr.DataArray, xr.DataArray]
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Difference(Reduction):
     """Difference between a variable and its value at a reference point.
@@ -62,7 +62,7 @@ class Difference(Reduction):
     along: str = ""
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of",)}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
     formula_template: ClassVar[str] = "{of} minus {reference}"
 
     def compute_difference(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -165,7 +165,7 @@ class Difference(Reduction):
         return [(own.where(apart, 0.0), {}), (others.where(apart, 0.0), place)]
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class RelativeDifference(Difference):
     """Relative difference between a variable and its reference value.
@@ -198,7 +198,7 @@ class RelativeDifference(Difference):
     """
 
     kind: ClassVar[str] = "relative_difference"
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
     formula_template: ClassVar[str] = "1 - {of} / {reference}"
 
     def compute_difference(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -240,7 +240,7 @@ class RelativeDifference(Difference):
         return -xr.ones_like(values) / reference, values / reference**2
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Range(Reduction):
     """Difference between the largest and the smallest value along a dimension.
@@ -273,7 +273,7 @@ class Range(Reduction):
     over: str = ""
     within: tuple[float, float] | None = None
     kind: ClassVar[str] = "range"
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of",)}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
 
     def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
         """Return the status of the cells in the coordinate range ``within``.
@@ -353,7 +353,7 @@ class Range(Reduction):
         return dimension, select_coordinate_range(dataset, self.over, self.within)
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class ClosedFormRatio(Reduction):
     """Ratio of a variable to a published closed-form solution.
@@ -392,7 +392,7 @@ class ClosedFormRatio(Reduction):
         "_closed_form": "closed-form value of {of}",
         "_error": "numerical error estimate of the ratio of {of} to its closed-form value",
     }
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"_closed_form": ("of",)}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
         """Check that the closed-form solution exists."""

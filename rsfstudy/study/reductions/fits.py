@@ -13,18 +13,18 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.study.reductions.base import (
     DerivativesAndCellCoordinates,
+    FieldsDeterminingUnitsByResultSuffix,
     Reduction,
-    UnitFieldNamesByResultSuffix,
     depends_on_failed_cells,
     find_dimension_of_coordinate,
     select_coordinate_range,
 )
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class LinearFit(Reduction):
     """Linear fit of a variable along one coordinate.
@@ -67,7 +67,10 @@ class LinearFit(Reduction):
     fitted_parameter_count: ClassVar[int] = 2
     formula_template: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of", "on"), "_misfit": ("of",)}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {
+        "": ("of", "on"),
+        "_misfit": ("of",),
+    }
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Subtract the mean of the values to eliminate the constant of the fit.
@@ -220,7 +223,7 @@ class LinearFit(Reduction):
 
 @accept_former_keyword_names
 @add_former_member_names
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class ProportionalFit(LinearFit):
     """Linear fit with a fixed intercept.
@@ -294,7 +297,7 @@ class ProportionalFit(LinearFit):
         return values - self.intercept
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class SemilogFit(LinearFit):
     """Linear fit of a variable against the decimal logarithm of a coordinate.
@@ -331,7 +334,7 @@ class SemilogFit(LinearFit):
     """
 
     kind: ClassVar[str] = "decade_fit"
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of",)}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
     formula_template: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
     def transform_abscissa(self, coordinate_values: xr.DataArray) -> xr.DataArray:
@@ -353,7 +356,7 @@ class SemilogFit(LinearFit):
         return logarithms
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class PowerLaw(SemilogFit):
     """Fit of a power law to a variable as a function of a coordinate.
@@ -388,7 +391,7 @@ class PowerLaw(SemilogFit):
     """
 
     kind: ClassVar[str] = "power_law"
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
     formula_template: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:

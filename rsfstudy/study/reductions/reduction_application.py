@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import xarray as xr
 
-from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.status import Status
 from rsfstudy.study.reductions.base import (
     Reduction,
@@ -71,7 +71,7 @@ def _list_data_variable_names(dataset: xr.Dataset) -> list[str]:
     return list(map(str, dataset.data_vars))
 
 
-@error_boundary
+@raise_only_rsfstudy_errors
 def apply_reductions(
     dataset: xr.Dataset, reductions: tuple[Reduction, ...], *, despite_failures: bool = False
 ) -> xr.Dataset:
@@ -157,7 +157,7 @@ def apply_reductions(
                     "refused", "some of the required cells failed or are missing"
                 )
             said = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
-            about = find_quantity(str(name), quantities).attributes
+            about = find_quantity(str(name), quantities).variable_attributes
             about |= {"coverage_content_type": find_coverage_content_type(str(name)), **said}
             if str(name) in stated and stated[str(name)].symbol:
                 about["symbol"] = stated[str(name)].symbol

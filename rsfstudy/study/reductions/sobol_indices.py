@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.quantities import Quantity
 from rsfstudy.study.reductions.base import Reduction, depends_on_failed_cells
 
@@ -25,7 +25,7 @@ _CONFIDENCE_INTERVAL_QUANTILES = (0.025, 0.975)
 _SOBOL_INDEX_NAMES = ("first_order", "total")
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class SobolIndices(Reduction):
     """First-order and total Sobol indices.

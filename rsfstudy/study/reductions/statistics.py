@@ -19,14 +19,14 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.quantities import Quantity
 from rsfstudy.status import Status
 from rsfstudy.study.reductions.base import (
     DerivativesAndCellCoordinates,
+    FieldsDeterminingUnitsByResultSuffix,
     Reduction,
-    UnitFieldNamesByResultSuffix,
     depends_on_failed_cells,
 )
 from rsfstudy.study.reductions.result_units import find_scale_varying_along_dimensions
@@ -55,7 +55,7 @@ class _SampleStatistic(Reduction):
         "_stderr": "sampling standard error of {name}",
         "_points": "number of samples with a value of {name}",
     }
-    unit_fields: ClassVar[UnitFieldNamesByResultSuffix] = {"": ("of",), "_stderr": ("of",)}
+    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",), "_stderr": ("of",)}
     #: Description of the statistic for the attribute ``comment`` of the results.
     description: ClassVar[str]
 
@@ -154,7 +154,7 @@ def compute_standard_deviation(
         return values.std(sample_dimension, ddof=degrees_of_freedom_lost)
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Mean(_SampleStatistic):
     """Mean of a variable over samples.
@@ -228,7 +228,7 @@ class Mean(_SampleStatistic):
         return [(has / has.sum(self.over), {})]
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class StandardDeviation(_SampleStatistic):
     """Standard deviation of a variable over at least three samples.
@@ -326,7 +326,7 @@ class StandardDeviation(_SampleStatistic):
         return [(by.fillna(0.0), {})]
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Quantile(_SampleStatistic):
     """Quantile of a variable over samples.
@@ -470,7 +470,7 @@ def _compute_interpolated_quantile(
     return (weights * values.where(weights > 0.0, 0.0)).sum(sample_dimension)
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class StatusShares(Reduction):
     """Share of the samples that have each status, including failures.
@@ -562,7 +562,7 @@ class StatusShares(Reduction):
         return xr.Dataset({name: values.where(known) for name, values in found.items()})
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Logarithm(Reduction):
     """Natural logarithm of a variable.

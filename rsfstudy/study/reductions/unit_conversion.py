@@ -8,14 +8,14 @@ from typing import ClassVar
 
 import xarray as xr
 
-from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 from rsfstudy.quantities import Quantity
 from rsfstudy.rig import DatasetUnits, compute_conversion_factor
 from rsfstudy.study.reductions.base import DerivativesAndCellCoordinates, Reduction
 
 
-@wrap_methods_in_error_boundary
+@make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class InUnits(Reduction):
     """Conversion of a variable to rig units, using the scales of each cell.

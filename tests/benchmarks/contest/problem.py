@@ -24,12 +24,12 @@ from rsfstudy.limit_cycles.stick_slip_cycles import (
     iterate_stick_slip_cycles,
 )
 from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
-from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
+from rsfstudy.motion.integration_events import EventKind, approach_to_steady_state, rise
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
 from rsfstudy.slider.equations import RUPTURE_REGIME, build_equations_between_ruptures
+from rsfstudy.slider.integration_path_length import LOG_SLIP_RATE_PER_PATH_LENGTH
 from rsfstudy.slider.motion_point import MotionPoint
-from rsfstudy.slider.path_length import LOG_SLIP_RATE_PER_PATH_LENGTH
 
 BUDGET = 10**9
 #: Indices of the parameters of a scene.
@@ -97,7 +97,7 @@ def cycle_problem(scene: Scene) -> Problem:
     approach = LimitCycleSearch(scene, Integrator(tight))
     if not approach.follow_cycles_until_converged(300):
         raise ValueError(f"no limit cycle: {scene}")
-    begin = approach.cycles[-1].end_point
+    begin = approach.cycles[-1].motion_point_at_end
     truth = next(iterate_stick_slip_cycles(scene, Integrator(tight), begin))
     coupling = scene.parts.normal_stress.coupling
     assert truth is not None

@@ -146,7 +146,7 @@ def select_values_of_window(
 
     Examples
     --------
-    >>> from rsfstudy.fitting.joint_model import select_values_of_window
+    >>> from rsfstudy.fitting.joint_window_model import select_values_of_window
     >>> select_values_of_window({"a": 0.01, "mu_star_1": 0.6, "mu_star_2": 0.62}, 2)
     {'a': 0.01, 'mu_star': 0.62}
     """
@@ -159,7 +159,7 @@ def select_values_of_window(
 
 
 @dataclass(frozen=True)
-class JointModel:
+class JointWindowModel:
     """Model of the friction in one or several windows.
 
     The class combines the rows of all windows, and has the same methods as ``WindowModel``.
@@ -190,7 +190,11 @@ class JointModel:
     def friction_averaging_time(self) -> float:
         """Averaging time of friction in s, or 0 if there is no averaging."""
         passed = self.window_models[0].friction_filter
-        return passed.size if passed is not None and passed.kind not in LOW_PASS_ORDERS else 0.0
+        return (
+            passed.averaging_time_or_frequency
+            if passed is not None and passed.kind not in LOW_PASS_ORDERS
+            else 0.0
+        )
 
     @property
     def recorded_friction_per_window(self) -> list[np.ndarray]:

@@ -33,7 +33,7 @@ def omit_constants_and_simplify_units(dataset: xr.Dataset) -> xr.Dataset:
     # The copy has variables of its own, so that their attributes can be replaced.
     simple = dataset.drop_vars(list(constants)).copy()
     for name in simple.variables:
-        simple[name].attrs = _replace_units_by_scale(dataset[name].attrs)
+        simple[name].attrs = _use_scale_attribute_as_units(dataset[name].attrs)
     return simple.assign_attrs({CONSTANT_COORDINATES_ATTRIBUTE: json.dumps(constants)})
 
 
@@ -50,7 +50,7 @@ def _read_constant_coordinate_value(coordinate: xr.DataArray) -> Any:
     return None if missing else plain if isinstance(plain, int | float | str) else str(plain)
 
 
-def _replace_units_by_scale(attributes: dict[Any, Any]) -> dict[Any, Any]:
+def _use_scale_attribute_as_units(attributes: dict[Any, Any]) -> dict[Any, Any]:
     """Return the attributes of a variable with readable units.
 
     The scale of a normalised variable becomes its ``units`` attribute. For a dimensionless variable

@@ -43,7 +43,7 @@ LOG_SLIP_RATE_PER_PATH_LENGTH = 6.0
 #: Largest slope of the path for which the square of the slope is computed. The slope is the
 #: derivative of (ln V)/6 with respect to displacement or inertial time. For a larger slope, 1 plus
 #: the square of the slope equals the square in double precision.
-MAX_PATH_SLOPE_WITH_FINITE_SQUARE = 1e9
+MAX_PATH_SLOPE_THAT_IS_SQUARED = 1e9
 
 VelocityRatios = tuple[float, float, float]
 
@@ -159,6 +159,6 @@ def compute_displacement_per_path_length(path_slope: float) -> float:
     float
         Derivative of displacement (or inertial time) with respect to path length.
     """
-    if abs(path_slope) > MAX_PATH_SLOPE_WITH_FINITE_SQUARE:
+    if abs(path_slope) > MAX_PATH_SLOPE_THAT_IS_SQUARED:
         return 1.0 / abs(path_slope)
     return 1.0 / math.sqrt(1.0 + path_slope * path_slope)

@@ -76,7 +76,7 @@ def compute_default_steady_state(
     return (stress_induced_state_shift - p[B] * log_slip_rate,)
 
 
-def find_evolutions_and_steady_states_of_law(
+def get_evolution_and_steady_state_functions(
     law: LawBase,
 ) -> tuple[NumericFunction, NumericFunction]:
     """Return the functions ``evolutions`` and ``steady_states`` of a law.
@@ -217,7 +217,7 @@ def build_tuple_scaling_function(component_count: int) -> NumericFunction:
 
 
 @cache
-def build_function_adding_step_to_states(state_count: int) -> NumericFunction:
+def build_function_adding_state_changes(state_count: int) -> NumericFunction:
     """Return a function that advances the states by a step.
 
     Parameters
@@ -320,7 +320,7 @@ def build_states_from_strength_function(law_state_count: int) -> NumericFunction
     return several_law_states
 
 
-def check_steady_states(scene: SceneView) -> None:
+def check_steady_states_of_user_law(scene: SceneView) -> None:
     """Check the steady states of a user-defined law.
 
     The states must not change in steady sliding, must add up to zero at :math:`V_*` and must be
@@ -338,7 +338,7 @@ def check_steady_states(scene: SceneView) -> None:
         If the law violates one of the conditions.
     """
     law, p, still = scene.parts.law, scene.parameter_values, _REST_TOLERANCE * scene.a
-    evolutions, steady_states = find_evolutions_and_steady_states_of_law(law)
+    evolutions, steady_states = get_evolution_and_steady_state_functions(law)
     for rate in _CHECKED_LOG_SLIP_RATES:
         psis = steady_states(rate, 0.0, p)
         change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))

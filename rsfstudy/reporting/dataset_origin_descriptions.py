@@ -11,7 +11,7 @@ import xarray as xr
 from rsfstudy.formatting import format_count_with_noun, format_fields_except_none
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reporting.cell_tables import format_status_counts
-from rsfstudy.reporting.fit_tables import scene_fields_set_by_fit
+from rsfstudy.reporting.fit_tables import list_scene_fields_set_by_fit
 from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
@@ -63,7 +63,9 @@ def describe_scene_and_rig_fields(
     return {name: text for name, text in told.items() if text}
 
 
-def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str, float]]:
+def find_constant_scene_and_rig_fields(
+    dataset: xr.Dataset,
+) -> tuple[dict[str, Any], dict[str, float]]:
     """Find the scene fields and rig quantities that are equal in all cells.
 
     Fields that a fit has determined are not included.
@@ -85,7 +87,7 @@ def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str,
         str(n).removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX)
         for n, along in dataset.coords.items()
         if along.dims
-    } | scene_fields_set_by_fit(dataset)
+    } | list_scene_fields_set_by_fit(dataset)
     scene = {n: v for n, v in declared.base.items() if n not in varied}
     rig = declared.laboratory or {}
     return scene, {name: rig[name] for name in Rig.convert_quantities_for_display(rig, varied)}
@@ -106,7 +108,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     """
     attrs, about = dataset.attrs, StoredDataset(dataset).provenance
     dims = dataset["status"].dims
-    scene, rig = find_constant_fields(dataset)
+    scene, rig = find_constant_scene_and_rig_fields(dataset)
     reduced = attrs.get("reduced_despite")
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return {
@@ -119,7 +121,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     }
 
 
-def describe_slow_instability_norms(dataset: xr.Dataset) -> str:
+def format_note_on_low_instability_norms(dataset: xr.Dataset) -> str:
     """Return a note if an instability norm is close to the load point velocity.
 
     Parameters

@@ -35,18 +35,18 @@ from rsfstudy.motion.array_layout import (
     STEADY_STATE_DISTANCE,
     STEADY_STATE_OFFSET,
 )
-from rsfstudy.motion.step_integration import (
+from rsfstudy.motion.integration_step_root_conditions import (
+    evaluate_event_function,
+    get_event_specification,
+    has_event_occurred,
+    locate_sign_change,
+)
+from rsfstudy.motion.integration_steps import (
     compute_slip_since_motion_start,
     compute_time_at_step_begin,
     compute_time_at_step_end,
     compute_time_since_regime_start,
     evaluate_point_within_step,
-)
-from rsfstudy.motion.step_root_conditions import (
-    evaluate_event_function,
-    get_event_specification,
-    has_event_occurred,
-    locate_sign_change,
 )
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, B
 
@@ -124,7 +124,7 @@ def append_step_end_event(motion, workspace, event_table, event_code):
     )
 
 
-def append_start_events(motion, workspace, last_point, event_table):
+def append_regime_or_segment_start_events(motion, workspace, last_point, event_table):
     """Append the events at the start of a regime or segment.
 
     The first event is the start of the regime or segment. The start of a segment is omitted if the

@@ -53,7 +53,7 @@ from rsfstudy.fitting.uniform_sampling_runs import (
     split_runs_at_noise_level_changes,
 )
 from rsfstudy.fitting.whiteness_test import (
-    LAG_COUNT_BEYOND_NOISE_ORDER as LAG_COUNT_BEYOND_NOISE_ORDER,
+    LAG_COUNT_BEYOND_AR_ORDER as LAG_COUNT_BEYOND_AR_ORDER,
 )
 from rsfstudy.fitting.whiteness_test import compute_ljung_box_p_value as compute_ljung_box_p_value
 

@@ -72,30 +72,30 @@ class Hold(NamedTuple):
 
     Parameters
     ----------
-    steady_rows_before : ndarray of int
+    steady_rows_before_hold : ndarray of int
         Rows of steady sliding before the hold.
-    stop_step : LoadingStep
+    loading_step_at_start : LoadingStep
         Step at which the load point stops.
-    reload_step : LoadingStep
+    loading_step_at_end : LoadingStep
         Step at which the load point starts again.
     next_step_or_record_end_time : float
         Time in s of the next step, or of the end of the record.
     """
 
-    steady_rows_before: np.ndarray
-    stop_step: LoadingStep
-    reload_step: LoadingStep
+    steady_rows_before_hold: np.ndarray
+    loading_step_at_start: LoadingStep
+    loading_step_at_end: LoadingStep
     next_step_or_record_end_time: float
 
     @property
     def quantities_without_uncertainty(self) -> tuple[float, float, float, float]:
         """Start time and duration of the hold in s, and adjacent velocities in um/s."""
-        duration = self.reload_step.middle - self.stop_step.middle
+        duration = self.loading_step_at_end.middle_time - self.loading_step_at_start.middle_time
         return (
-            self.stop_step.middle,
+            self.loading_step_at_start.middle_time,
             duration,
-            self.stop_step.velocity_before,
-            self.reload_step.velocity_after,
+            self.loading_step_at_start.velocity_before,
+            self.loading_step_at_end.velocity_after,
         )
 
 
@@ -220,13 +220,17 @@ class HoldFit:
         displacement_variance: float,
     ) -> None:
         self.time, self.hold, self.displacement_variance = time, hold, displacement_variance
-        late = np.maximum(time - hold.reload_step.middle, 0.0)
-        early = np.minimum(time - hold.stop_step.middle, 0.0)
+        late = np.maximum(time - hold.loading_step_at_end.middle_time, 0.0)
+        early = np.minimum(time - hold.loading_step_at_start.middle_time, 0.0)
         #: Load point displacement minus the displacement during the hold.
-        self.moved = hold.stop_step.velocity_before * early + hold.reload_step.velocity_after * late
+        self.moved = (
+            hold.loading_step_at_start.velocity_before * early
+            + hold.loading_step_at_end.velocity_after * late
+        )
         self.level = friction - trend * self.moved
         self.rows_after = np.flatnonzero(
-            (time > hold.reload_step.middle) & (time < hold.next_step_or_record_end_time)
+            (time > hold.loading_step_at_end.middle_time)
+            & (time < hold.next_step_or_record_end_time)
         )
 
     def estimate_hold_quantities(self) -> tuple[list[float], list[float], list[float]]:
@@ -242,7 +246,7 @@ class HoldFit:
         trend_derivatives : list of float
             Derivatives of the values with respect to the trend.
         """
-        before, time = self.hold.steady_rows_before, self.time
+        before, time = self.hold.steady_rows_before_hold, self.time
         if not len(before):
             return [math.nan] * 5, [math.nan] * 5, [0.0] * 5
         held, (peak, is_adequate) = self._choose_rows_of_hold_end(), self._choose_rows_of_peak()
@@ -295,7 +299,7 @@ class HoldFit:
     @cached_property
     def _noise_reference_fit(self) -> GeneralisedLeastSquaresFit:
         """Fit to rows without a friction peak, whose noise is used to select windows."""
-        rows, after = self.hold.steady_rows_before, self.rows_after
+        rows, after = self.hold.steady_rows_before_hold, self.rows_after
         if len(after) > 1:
             gaps = np.gradient(self.time)
             ratio = gaps[rows] / float(np.median(gaps[after]))
@@ -311,8 +315,8 @@ class HoldFit:
 
     def _compute_normalised_log_hold_time(self, rows: np.ndarray) -> np.ndarray:
         """Return the logarithm of hold time, scaled to 1 at the end of the hold."""
-        times = np.append(self.time[rows], self.hold.reload_step.middle)
-        logs = np.log(times - self.hold.stop_step.middle)
+        times = np.append(self.time[rows], self.hold.loading_step_at_end.middle_time)
+        logs = np.log(times - self.hold.loading_step_at_start.middle_time)
         return rescale_to_minus_one_to_one(logs)[:-1]
 
     def _choose_rows_of_hold_end(self) -> np.ndarray:
@@ -321,18 +325,22 @@ class HoldFit:
         Rows close to the start or the end of the hold are excluded, because the step times have
         errors.
         """
-        time, begins, ends = self.time, self.hold.stop_step.end, self.hold.reload_step.start
+        time, begins, ends = (
+            self.time,
+            self.hold.loading_step_at_start.end,
+            self.hold.loading_step_at_end.start,
+        )
         rows = np.flatnonzero((time > begins) & (time < ends))
         if len(rows) < 2:
             return rows[:0]
         gap = float(np.median(np.diff(time[rows])))
-        speed = self.hold.reload_step.velocity_after
+        speed = self.hold.loading_step_at_end.velocity_after
         guard = 0.5 * gap + math.cbrt(self.displacement_variance * gap / speed**2)
         rows = rows[(time[rows] > begins + guard) & (time[rows] < ends - guard)]
         windows = (
             rows[-count:] for count in _HOLD_END_WINDOW_LENGTHS_IN_ROWS if count <= len(rows)
         )
-        logs = np.log(np.maximum(time - self.hold.stop_step.middle, 1e-300))
+        logs = np.log(np.maximum(time - self.hold.loading_step_at_start.middle_time, 1e-300))
         degree = _HOLD_END_DEGREES[0]
         return choose_longest_polynomial_window(
             windows, logs, self.level, degree, self._noise_reference_fit
@@ -351,7 +359,8 @@ class HoldFit:
             return chosen, is_adequate
         smooth = median_filter(level[after], _RUNNING_MEDIAN_ROWS, mode="nearest")
         sd = max(
-            float(np.std(level[self.hold.steady_rows_before])), self._noise_reference_fit.noise_sd
+            float(np.std(level[self.hold.steady_rows_before_hold])),
+            self._noise_reference_fit.noise_sd,
         )
         fallen = np.maximum.accumulate(smooth) - smooth > _MIN_FALL_AFTER_PEAK_SIGMAS * sd
         if not fallen.any():
@@ -404,8 +413,11 @@ class HoldFit:
             low = find_polynomial_maximum_position(fewer)
             misfit = float(polynomial.polyval(low if math.isfinite(low) else at, fewer)) - value
         half = 0.5 * float(self.time[rows[-1]] - self.time[rows[0]])
-        speed, when = self.hold.reload_step.velocity_after, self.time[rows[0]] + (at + 1.0) * half
-        distance = speed * float(when - self.hold.reload_step.middle)
+        speed, when = (
+            self.hold.loading_step_at_end.velocity_after,
+            self.time[rows[0]] + (at + 1.0) * half,
+        )
+        distance = speed * float(when - self.hold.loading_step_at_end.middle_time)
         padding = np.zeros(first)
         by_slope = speed * half * of_slope / curvature
         return (

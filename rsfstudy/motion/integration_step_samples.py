@@ -19,20 +19,20 @@ from rsfstudy.motion.array_layout import (
     SPRING_STRESS,
     STATE_VARIABLE,
 )
-from rsfstudy.motion.recording import (
-    FIRST_STATE_COLUMN,
-    REGIME_COLUMN,
-    SAMPLE_NUMBER_COLUMN,
-    SAMPLES_PER_STEP,
-)
-from rsfstudy.motion.step_integration import (
+from rsfstudy.motion.integration_step_root_conditions import TIME_CONDITION, locate_sign_change
+from rsfstudy.motion.integration_steps import (
     compute_slip_since_motion_start,
     compute_time_at_step_begin,
     compute_time_at_step_end,
     compute_time_since_regime_start,
     evaluate_point_within_step,
 )
-from rsfstudy.motion.step_root_conditions import TIME_CONDITION, locate_sign_change
+from rsfstudy.motion.recording import (
+    FIRST_STATE_COLUMN,
+    REGIME_COLUMN,
+    SAMPLE_NUMBER_COLUMN,
+    SAMPLES_PER_INTEGRATION_STEP,
+)
 
 
 def record_regime_start(motion, workspace, recording_table):
@@ -118,7 +118,7 @@ def record_step_samples(motion, workspace, recording_table, requested_samples, i
 
 
 def record_evenly_spaced_samples(motion, workspace, recording_table):
-    """Record ``SAMPLES_PER_STEP`` samples of the step.
+    """Record ``SAMPLES_PER_INTEGRATION_STEP`` samples of the step.
 
     The last sample is the end of the step.
 
@@ -131,15 +131,15 @@ def record_evenly_spaced_samples(motion, workspace, recording_table):
     recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
         Output table of recorded samples.
     """
-    for sample in range(1, SAMPLES_PER_STEP):
-        clock = motion.clock + (motion.end - motion.clock) * (sample / SAMPLES_PER_STEP)
+    for sample in range(1, SAMPLES_PER_INTEGRATION_STEP):
+        clock = motion.clock + (motion.end - motion.clock) * (sample / SAMPLES_PER_INTEGRATION_STEP)
         record_sample_within_step(motion, workspace, recording_table, clock)
         recording_table[motion.recorded_rows - 1, SAMPLE_NUMBER_COLUMN] = sample
     passed = compute_time_at_step_end(motion, workspace)
     append_sample_row(
         motion, recording_table, motion.end, passed, workspace.point_at_end, workspace.parameters
     )
-    recording_table[motion.recorded_rows - 1, SAMPLE_NUMBER_COLUMN] = SAMPLES_PER_STEP
+    recording_table[motion.recorded_rows - 1, SAMPLE_NUMBER_COLUMN] = SAMPLES_PER_INTEGRATION_STEP
 
 
 def record_requested_samples(motion, workspace, recording_table, requested_samples, is_motion_over):

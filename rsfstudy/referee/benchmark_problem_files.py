@@ -23,8 +23,8 @@ import msgspec
 import numpy as np
 from scipy.special import lambertw
 
-from rsfstudy.error_boundary import check_regular_file, format_exception
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
+from rsfstudy.exception_conversion import check_regular_file, format_exception
 from rsfstudy.motion import Event, EventKind, Integrator, MotionStopped
 from rsfstudy.parts import Segment
 from rsfstudy.path_checks import check_path_is_valid
@@ -45,7 +45,7 @@ SI_UNITS_BY_SCALAR_QUANTITY = {
     "static_stress_drop": "Pa", "dynamic_stress_drop": "Pa", "peak_slip_rate": "m/s",
     "slowest_slip_rate": "m/s",
 }  # fmt: skip
-SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND = {
+SI_UNITS_BY_ANSWER_TYPE_AND_QUANTITY = {
     "series": SI_UNITS_BY_SERIES_QUANTITY,
     "peaks": SI_UNITS_BY_PEAK_QUANTITY,
     "numbers": SI_UNITS_BY_SCALAR_QUANTITY,
@@ -148,9 +148,9 @@ class BenchmarkProblem:
 
     def __post_init__(self) -> None:
         """Validate the fields of the problem."""
-        if self.report not in SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND:
+        if self.report not in SI_UNITS_BY_ANSWER_TYPE_AND_QUANTITY:
             raise InvalidValue(
-                "report", self.report, "is unknown", choices=SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND
+                "report", self.report, "is unknown", choices=SI_UNITS_BY_ANSWER_TYPE_AND_QUANTITY
             )
         if not self.quantities:
             rule = "must list at least one quantity"
@@ -196,7 +196,7 @@ class BenchmarkProblem:
     @property
     def si_units_by_quantity(self) -> Mapping[str, str]:
         """SI units of the quantities that can be requested, by name."""
-        return SI_UNITS_OF_QUANTITIES_BY_REPORT_KIND[self.report]
+        return SI_UNITS_BY_ANSWER_TYPE_AND_QUANTITY[self.report]
 
     @property
     def answer_index_column_name(self) -> str:
@@ -291,7 +291,7 @@ class BenchmarkProblem:
         if "V_c" in si:
             fields["cutoff_velocity_ratio"] = si["V_c"] / rig.reference_velocity
         if "V_unstable" in si:
-            period = rig.period or SceneFields.collect_defaults()["period"]
+            period = rig.period or SceneFields.map_field_names_to_defaults()["period"]
             norm = si["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
             fields["instability_norm"] = norm
         if self.loading:
@@ -335,7 +335,7 @@ class BenchmarkProblem:
         return math.log(rate / self.rig.reference_velocity)
 
     @property
-    def initial_state_event(self) -> Event | None:
+    def initial_motion_state(self) -> Event | None:
         """Initial state of the motion, computed from the initial slip rate and theta.
 
         The stress of the spring is chosen so that the slip rate before the first step of the
@@ -356,15 +356,19 @@ class BenchmarkProblem:
         if scene.parts.law.regularised:
             above = (scene.mu_star + friction) / scene.a
             friction = scene.a * math.asinh(0.5 * math.exp(above)) - scene.mu_star
-        taken = before.compute_steady_states(0.0, before.friction_relation()(friction)[2])
+        taken = before.compute_steady_states(0.0, before.build_friction_relation()(friction)[2])
         psis = (
             *map(add, states, taken),
             *taken[len(states) :],
             *scene.parts.loading.initial_unknowns(scene),
         )
         radiated = before.dynamics.radiated_stress(x)
-        point = acting.slow_manifold_point(friction + radiated + acting.spring_stress_step, psis)
-        point = Integrator.point_with_slip_rate(acting, point, x) if scene.has_mass else point
+        point = acting.compute_slow_manifold_point(
+            friction + radiated + acting.spring_stress_step, psis
+        )
+        point = (
+            Integrator.compute_point_with_slip_rate(acting, point, x) if scene.has_mass else point
+        )
         return Event(EventKind.START, None, 0.0, 0.0, point, "", 0, 0.0)
 
     def _compute_initial_state_variables(self) -> tuple[float, ...]:
@@ -434,7 +438,7 @@ def read_problem(path: Path) -> BenchmarkProblem:
                 raise InvalidValue("problem", [*stated], f"must contain {name}")
         number = int(path.name[:2]) if path.parent == SHIPPED_PROBLEM_FOLDER else 0
         problem = BenchmarkProblem(**stated, number=number)
-        _ = problem.scene, problem.initial_state_event
+        _ = problem.scene, problem.initial_motion_state
         return problem
     except InvalidValue as error:
         raise error.with_location(str(path)) from error

@@ -23,7 +23,7 @@ from rsfstudy.motion import EventSpecification, rise
 from rsfstudy.slider import MotionPoint, Scene
 
 #: Differences ln V_0 - ln V at which the motion is tested for a monotonic rise.
-_TESTED_LOG_RATES_BELOW_LOAD_RATE = (
+_TESTED_LOG_RATE_GAPS_TO_LOAD_RATE = (
     10.0,
     8.0,
     7.0,
@@ -54,7 +54,7 @@ _TESTED_LOG_RATES_BELOW_LOAD_RATE = (
 #: Largest ratio of the change in ln V over a slip of D_c to the difference ln V_0 - ln V. The test
 #: for a monotonic rise is worthwhile only below this ratio, because the integration of such a slow
 #: motion would take hundreds of steps.
-_MAX_RISE_PER_DC_OVER_LOG_RATE_GAP = 0.02
+_MAX_RELATIVE_LOG_RATE_RISE_PER_DC = 0.02
 
 
 def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]:
@@ -76,11 +76,11 @@ def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:
         return []
-    if not scene.stiffness < _MAX_RISE_PER_DC_OVER_LOG_RATE_GAP * (
+    if not scene.stiffness < _MAX_RELATIVE_LOG_RATE_RISE_PER_DC * (
         scene.a + scene.dynamics.radiated_stress_slope(load)
     ):
         return []
-    return [rise("log_slip_rate", load - below) for below in _TESTED_LOG_RATES_BELOW_LOAD_RATE]
+    return [rise("log_slip_rate", load - below) for below in _TESTED_LOG_RATE_GAPS_TO_LOAD_RATE]
 
 
 def is_slip_rate_rise_monotone(scene: Scene, motion_point: MotionPoint) -> bool:
@@ -136,7 +136,7 @@ def _build_log_rate_and_state_lag_derivatives(
     no stress corresponds to the friction at this slip rate and lag.
     """
     relation, evolution = (
-        scene.friction_relation(),
+        scene.build_friction_relation(),
         build_single_state_evolution_function(scene),
     )
 
@@ -175,5 +175,5 @@ def build_single_state_evolution_function(scene: Scene) -> Callable[[float, floa
     callable
         Function ``(ln(V/V_*), state) -> change in the state per unit slip``.
     """
-    evolve = scene.state_evolution_function()
+    evolve = scene.build_state_evolution_function()
     return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]

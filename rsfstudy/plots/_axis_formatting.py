@@ -122,7 +122,7 @@ def read_flag_meanings_of_variable(variable: xr.DataArray) -> dict[float, str]:
     }
 
 
-def list_measured_variables(dataset: xr.Dataset) -> list[str]:
+def list_numeric_result_variables(dataset: xr.Dataset) -> list[str]:
     """Return the names of the measured variables of a study.
 
     Parameters
@@ -170,7 +170,7 @@ def list_primary_and_varying_variables(dataset: xr.Dataset) -> list[str]:
         Name of the primary output, followed by the names of all other measured variables that have
         at least two different values.
     """
-    names = list_measured_variables(dataset)
+    names = list_numeric_result_variables(dataset)
     return names[:1] + [n for n in names[1:] if float(dataset[n].max()) > float(dataset[n].min())]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.readers import read_table_from_source
-from rsfstudy.rig.readers.table_sources import LazyTable
+from rsfstudy.rig.readers.tables_from_files_or_objects import LazyTable
 from rsfstudy.rig.table_columns import (
     HEADING_PATTERN,
     Column,

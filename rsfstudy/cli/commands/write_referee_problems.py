@@ -1,4 +1,4 @@
-"""Command ``rsfstudy problems``."""
+"""Command ``rsfstudy write_referee_problems``."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from rsfstudy.cli.command_results import EXIT_STATUS_OK
 from rsfstudy.cli.printing import print_line
 
 
-@click.command(cls=CommandWithOptionsObject)
+@click.command("problems", cls=CommandWithOptionsObject)
 @click.argument("directory", metavar="DIR", type=options.PathParameterType())
-def problems(command_options: options.CommandOptions) -> int:
+def write_referee_problems(command_options: options.CommandOptions) -> int:
     """Write all benchmark problems to a new directory.
 
     Each problem includes its reference solution, a table to fill in, and an example in plain SciPy.

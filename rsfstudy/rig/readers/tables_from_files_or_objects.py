@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.exception_conversion import check_regular_file
 from rsfstudy.rig.table_columns import (
     HEADING_PATTERN,
     Column,
@@ -106,7 +106,7 @@ class LazyTable:
         Headings of all columns, such as ``Time (s)`` or ``Time``.
     heading_location : str
         Location of the headings for error messages.
-    load_numeric_column : callable
+    numeric_column_loader : callable
         Function that converts the numbers of a column. The function takes the index of the column
         and the name of the quantity, and returns a ``Column``. The units of the column are an empty
         string unless the units follow from the type of the numbers.
@@ -127,7 +127,7 @@ class LazyTable:
 
     headings: Sequence[str]
     heading_location: str
-    load_numeric_column: Callable[[int, str], Column]
+    numeric_column_loader: Callable[[int, str], Column]
     has_headings: bool = True
     columns_have_no_units: bool = False
     headings_are_column_names: bool = False
@@ -228,7 +228,7 @@ class LazyTable:
             raise InvalidValue(
                 quantity_name, units, f"contradicts the units in the file, {of_file}", remedy=remedy
             ).with_location(self.heading_location)
-        column = self.load_numeric_column(index, quantity_name)
+        column = self.numeric_column_loader(index, quantity_name)
         values = column.values
         if (scale, offset) != (1.0, 0.0):
             values = values * scale + offset

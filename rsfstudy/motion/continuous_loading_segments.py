@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from rsfstudy.motion.event_spec_table import find_events_at_jump
-from rsfstudy.motion.events import Event, EventKind, EventSpecification
+from rsfstudy.motion.event_spec_table import find_events_at_stress_jump
 from rsfstudy.motion.initial_points import compute_point_after_loading_jump
+from rsfstudy.motion.integration_events import Event, EventKind, EventSpecification
 from rsfstudy.parts import (
     LOADING,
     SEGMENT_END,
@@ -44,7 +44,7 @@ def split_segments_at_stress_jumps(
     return scene.segment_sequences_without_jumps
 
 
-def find_segments_left_to_integrate(
+def find_remaining_loading_segments(
     scene: Scene, last_event: Event
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
     """Return the segment chains that remain when a motion is resumed.
@@ -80,7 +80,7 @@ def find_segments_left_to_integrate(
     return left, point
 
 
-def truncate_segment_table_at_time(segment_table: np.ndarray, end_time: float) -> np.ndarray:
+def truncate_loading_segments_at_time(segment_table: np.ndarray, end_time: float) -> np.ndarray:
     """Return the loading segments of a chain up to an end time.
 
     Parameters
@@ -103,7 +103,7 @@ def truncate_segment_table_at_time(segment_table: np.ndarray, end_time: float) -
     return cut
 
 
-def prepare_segment_with_noise(
+def prepare_noisy_loading_segment(
     scene: Scene, start_point: MotionPoint, segment_table: np.ndarray
 ) -> tuple[MotionPoint, FloatTuple, np.ndarray, Iterator[np.ndarray]]:
     """Return the initial values and the segment tables of a segment with noise.
@@ -129,7 +129,9 @@ def prepare_segment_with_noise(
         Further blocks of the segment table.
     """
     begin, end = (float(segment_table[0, column]) for column in (SEGMENT_START, SEGMENT_END))
-    tables = scene.parts.loading_noise.iterate_segment_table_blocks(begin, end, scene.load_velocity)
+    tables = scene.parts.loading_noise.iterate_noisy_loading_segment_blocks(
+        begin, end, scene.load_velocity
+    )
     table = next(tables)
     parameters = list(scene.parameter_values)
     parameters[-1] = float(table[0, SEGMENT_NOISE_RATE])
@@ -170,7 +172,7 @@ def iterate_segment_start_events(
         Events at the start of the chain.
     """
     yield segment_entry_event._replace(kind=EventKind.SEGMENT_START)
-    for spec, point in find_events_at_jump(
+    for spec, point in find_events_at_stress_jump(
         *point_and_parameters_before,
         segment_entry_event.point,
         segment_scene.parameter_values,
@@ -191,7 +193,7 @@ def select_event_specs_that_can_occur(
 
     The motion can settle only in the last chain. Settling events are omitted if the load point
     oscillates. If steady sliding is unstable, terminal settling events are also omitted, because
-    these events would end the motion. See ``drop_settling_events_if_unstable`` for other settling
+    these events would end the motion. See ``remove_settling_events_if_unstable`` for other settling
     events.
 
     Parameters
@@ -220,7 +222,7 @@ def select_event_specs_that_can_occur(
     return [spec for spec in event_specs if spec not in settling]
 
 
-def drop_settling_events_if_unstable(
+def remove_settling_events_if_unstable(
     scene: Scene, motion_events: Iterator[Event]
 ) -> Iterator[Event]:
     """Yield the events of a motion, except settling at unstable steady sliding.

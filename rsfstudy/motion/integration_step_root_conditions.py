@@ -27,15 +27,15 @@ from rsfstudy.motion.array_layout import (
     SPRING_STRESS,
 )
 from rsfstudy.motion.array_operations import advance_pointer_by_items
+from rsfstudy.motion.integration_steps import (
+    compute_time_since_regime_start,
+    evaluate_point_within_step,
+)
 from rsfstudy.motion.regime_switching import (
     compute_inertia_effect_over_limit,
     compute_margin_to_motion_termination,
 )
 from rsfstudy.motion.root_finding import build_root_finder
-from rsfstudy.motion.step_integration import (
-    compute_time_since_regime_start,
-    evaluate_point_within_step,
-)
 from rsfstudy.motion.steppers import interpolate_unknowns
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY
 

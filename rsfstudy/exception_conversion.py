@@ -39,7 +39,7 @@ _WRAPPED_SPECIAL_METHODS = ("__init__", "__new__", "__call__", "__getitem__")
 _MODULES_SKIPPED_WHEN_FINDING_CALLER = ("dataclasses", "functools", "rsfstudy._deprecation")
 
 
-def error_boundary(
+def raise_only_rsfstudy_errors(
     function: Callable[FunctionParameters, FunctionResult],
     *,
     applies_to_internal_calls: bool = False,
@@ -69,14 +69,14 @@ def error_boundary(
     or to ``DataError`` if a dataset caused the exception. The original exception is the cause of
     the new exception.
     """
-    return _wrap_in_error_boundary(
+    return _wrap_to_raise_rsfstudy_errors(
         function,
         applies_to_internal_calls=applies_to_internal_calls,
         unchanged_exceptions=unchanged_exceptions,
     )
 
 
-def wrap_methods_in_error_boundary(wrapped_class: WrappedClass) -> WrappedClass:
+def make_methods_raise_rsfstudy_errors(wrapped_class: WrappedClass) -> WrappedClass:
     """Apply the error boundary to the constructor and the public methods.
 
     The wrapped constructor also rejects arguments that do not match their annotations. Most
@@ -100,11 +100,13 @@ def wrap_methods_in_error_boundary(wrapped_class: WrappedClass) -> WrappedClass:
         is_constructor = name in ("__init__", "__new__")
         is_static = isinstance(member, staticmethod)
         if isinstance(member, classmethod) or (is_static and is_constructor):
-            guarded = _wrap_in_error_boundary(member.__func__, is_constructor=is_constructor)
+            guarded = _wrap_to_raise_rsfstudy_errors(member.__func__, is_constructor=is_constructor)
             setattr(wrapped_class, name, type(member)(guarded))
         elif inspect.isfunction(member):
             setattr(
-                wrapped_class, name, _wrap_in_error_boundary(member, is_constructor=is_constructor)
+                wrapped_class,
+                name,
+                _wrap_to_raise_rsfstudy_errors(member, is_constructor=is_constructor),
             )
     return wrapped_class
 
@@ -113,7 +115,7 @@ class ConstructorKeywordCheckMixin:
     """Base class for classes that users define, such as measures.
 
     If a keyword argument of the constructor is unknown, the error lists the valid keywords. The
-    check is needed because ``wrap_methods_in_error_boundary`` is not applied to user-defined
+    check is needed because ``make_methods_raise_rsfstudy_errors`` is not applied to user-defined
     classes.
 
     Parameters
@@ -140,17 +142,17 @@ class ConstructorKeywordCheckMixin:
 
 
 @functools.cache
-def _list_constructor_parameters(cls: type) -> tuple[str, ...]:
+def _list_constructor_parameters(inspected_class: type) -> tuple[str, ...]:
     """Return the parameter names of the constructor of a class.
 
     The tuple is empty if the constructor accepts arbitrary keywords.
     """
-    parameters = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
+    parameters = inspect.signature(inspected_class.__init__).parameters  # type: ignore[misc]
     takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
     return () if takes_any else tuple(parameters)[1:]
 
 
-def _wrap_in_error_boundary(
+def _wrap_to_raise_rsfstudy_errors(
     function: Callable[FunctionParameters, FunctionResult],
     *,
     applies_to_internal_calls: bool = False,

@@ -11,25 +11,25 @@ from rsfstudy.motion.array_layout import (
     SPRING_STRESS,
 )
 from rsfstudy.motion.array_operations import evaluate_function_into_array
+from rsfstudy.motion.integration_step_root_conditions import (
+    SWITCH_CONDITION,
+    TERMINATION_CONDITION,
+    TIME_CONDITION,
+    compute_excess_over_switch_threshold,
+    locate_sign_change,
+)
+from rsfstudy.motion.integration_steps import (
+    compute_time_at_step_begin,
+    compute_time_at_step_end,
+    compute_time_since_regime_start,
+    truncate_step_at,
+)
 from rsfstudy.motion.regime_switching import (
     CONTINUES,
     compute_margin_to_motion_termination,
     find_termination_status,
     is_slip_slow_enough_for_slow_manifold,
     should_switch_back_to_slow_manifold,
-)
-from rsfstudy.motion.step_integration import (
-    compute_time_at_step_begin,
-    compute_time_at_step_end,
-    compute_time_since_regime_start,
-    truncate_step_at,
-)
-from rsfstudy.motion.step_root_conditions import (
-    SWITCH_CONDITION,
-    TERMINATION_CONDITION,
-    TIME_CONDITION,
-    compute_excess_over_switch_threshold,
-    locate_sign_change,
 )
 from rsfstudy.motion.steppers import retake_step
 from rsfstudy.parts import LOAD_VELOCITY

@@ -34,8 +34,8 @@ _MAX_DISCONTINUITY_DURATION_IN_ULPS = 16
 _MAX_LOG10_SLIP_RATE_CHANGE_PER_ROW = 0.5
 
 
-def find_motion_events(
-    motion: xr.Dataset, slip_rate_threshold: float | None, scene: Callable[[], Scene]
+def find_slip_events_of_motion(
+    motion: xr.Dataset, slip_rate_threshold: float | None, build_scene: Callable[[], Scene]
 ) -> xr.Dataset:
     """Find the events of a motion.
 
@@ -46,7 +46,7 @@ def find_motion_events(
     slip_rate_threshold : float, optional
         Threshold of the slip rate in V_*. The default is 10 times the highest load point velocity
         of the scene, and at least 10.
-    scene : callable
+    build_scene : callable
         Function without arguments that returns the scene of the motion. The function is called only
         if ``slip_rate_threshold`` is None.
 
@@ -68,15 +68,15 @@ def find_motion_events(
             reason = "does not have the dimension time" if name in motion else "is missing"
             raise DataError(f"{name} {reason}. Pass a motion from rsfstudy.simulate.")
     times, *rest = (np.asarray(motion[name], dtype=float) for name in names)
-    arrest = _find_log10_arrest_slip_rate(motion, scene)
+    arrest = _find_log10_arrest_slip_rate(motion, build_scene)
     if slip_rate_threshold is None:
-        loads = [segment.load_velocity for segment in scene().parts.loading.segments]
+        loads = [segment.load_velocity for segment in build_scene().parts.loading.segments]
         slip_rate_threshold = _MIN_EVENT_SLIP_RATE_OVER_LOAD_VELOCITY * max([1.0, *loads])
     if not 0.0 < slip_rate_threshold < math.inf:
         raise InvalidValue(
             "slip_rate", slip_rate_threshold, "must be positive and finite (in units of V_*)"
         )
-    rows = InterpolatedMotionRows(
+    rows = InterpolatorBetweenMotionRows(
         times, np.column_stack(rest), math.log10(slip_rate_threshold), arrest
     )
     found = [rows.measure_event(*ends) for ends in rows.find_event_row_spans()]
@@ -95,7 +95,9 @@ def find_motion_events(
     return catalogue
 
 
-def _find_log10_arrest_slip_rate(motion: xr.Dataset, scene: Callable[[], Scene]) -> float | None:
+def _find_log10_arrest_slip_rate(
+    motion: xr.Dataset, build_scene: Callable[[], Scene]
+) -> float | None:
     """Return the logarithm (base 10) of the slip rate at which events end.
 
     In a scene with noise, an event ends when the slip rate falls below the smallest nonzero load
@@ -103,11 +105,11 @@ def _find_log10_arrest_slip_rate(motion: xr.Dataset, scene: Callable[[], Scene])
     """
     if json.loads(motion.attrs.get("scene", "{}")).get("noise", "none") == "none":
         return None
-    loads = [abs(segment.load_velocity) for segment in scene().parts.loading.segments]
+    loads = [abs(segment.load_velocity) for segment in build_scene().parts.loading.segments]
     return math.log10(min((load for load in loads if load), default=1.0))
 
 
-class InterpolatedMotionRows:
+class InterpolatorBetweenMotionRows:
     """Interpolation between the rows of a motion.
 
     Parameters
