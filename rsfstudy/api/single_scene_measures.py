@@ -97,6 +97,21 @@ def critical_step(
     rsfstudy.measures.CriticalStep : Equations and references of the measure.
     rsfstudy.limit_cycle : Compute the limit cycle of a scene.
 
+    Notes
+    -----
+    The critical step depends on the instability norm of the scene, and the error does not include
+    this dependence.
+
+    Under the slowness law at constant normal stress, the slip rate of every quasi-static motion with
+    :math:`k \ge k_{cr}` stays bounded [1]_. The computed step is then the smallest step after which
+    the slip rate reaches the norm, and it grows without limit with the norm.
+
+    References
+    ----------
+    .. [1] Ranjith, K., & Rice, J. R. (1999). Stability of quasi-static slip in a single degree of
+       freedom elastic system with rate and state dependent friction. J. Mech. Phys. Solids, 47,
+       1207-1218.
+
     Examples
     --------
     At constant normal stress and critical stiffness, the critical displacement is

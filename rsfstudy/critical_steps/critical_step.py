@@ -131,6 +131,10 @@ class CriticalStep(Measure):
     or a displacement of :math:`D_c\,a/(b - a)`. The measure computes the boundaries of eqs. 10, 11
     and 14 of [2]_.
 
+    Under the slowness law at constant normal stress, the slip rate of every quasi-static motion with
+    :math:`k \ge k_{cr}` stays bounded [3]_. The computed step is then the smallest step after which
+    the slip rate reaches the norm, and it grows without limit with the norm.
+
     References
     ----------
     .. [1] Gu, J.-C., Rice, J. R., Ruina, A. L., & Tse, S. T. (1984). Slip motion and stability of a
@@ -139,6 +143,9 @@ class CriticalStep(Measure):
     .. [2] Effect of varying normal stress on stability and dynamic motion of a spring-slider system
        with rate- and state-dependent friction. Earthquake Science (2014).
        doi:10.1007/s11589-014-0098-4
+    .. [3] Ranjith, K., & Rice, J. R. (1999). Stability of quasi-static slip in a single degree of
+       freedom elastic system with rate and state dependent friction. J. Mech. Phys. Solids, 47,
+       1207-1218.
 
     Examples
     --------
