@@ -66,6 +66,8 @@ class LinearFit(Reduction):
     #: are field names of the fit.
     fitted_parameter_count: ClassVar[int] = 2
     formula_template: ClassVar[str] = "{of} = constant + {name} * {on}"
+    #: Template of an explanation of the slope, which is appended to the attribute ``comment``.
+    _slope_note_template: ClassVar[str] = ""
     kind: ClassVar[str] = "linear_fit"
     unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {
         "": ("of", "on"),
@@ -148,7 +150,8 @@ class LinearFit(Reduction):
         span = "all {on}" if self.within is None else "{0:g} <= {on} <= {1:g}"
         span = span.format(*(self.within or ()), on=self.on)
         law = self.formula_template.format(**vars(self))
-        result = self.results(f"least-squares fit of {law} for {span}", found)
+        note = self._slope_note_template.format(**vars(self))
+        result = self.results(f"least-squares fit of {law} for {span}{note}", found)
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
@@ -303,8 +306,9 @@ class SemilogFit(LinearFit):
     """Linear fit of a variable against the decimal logarithm of a coordinate.
 
     The equation ``of = constant + name * log10(on)`` is fitted by unweighted least squares. The
-    slope is the change in the variable per decade. Points are omitted if the coordinate is not
-    positive. To fit a power law, use `PowerLaw`. If you apply `SemilogFit` to the result of
+    slope is the change in the variable per decade. A slope per unit of the natural logarithm is
+    smaller by a factor of ln(10) = 2.303. Points are omitted if the coordinate is not positive. To
+    fit a power law, use `PowerLaw`. If you apply `SemilogFit` to the result of
     `Logarithm`, which is a natural logarithm, the slope is 2.303 times the exponent of the power
     law.
 
@@ -336,6 +340,7 @@ class SemilogFit(LinearFit):
     kind: ClassVar[str] = "decade_fit"
     unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
     formula_template: ClassVar[str] = "{of} = constant + {name} * log10({on})"
+    _slope_note_template: ClassVar[str] = "; the slope is the change of {of} per decade of {on}"
 
     def transform_abscissa(self, coordinate_values: xr.DataArray) -> xr.DataArray:
         """Compute the decimal logarithm of the coordinate.
@@ -393,6 +398,7 @@ class PowerLaw(SemilogFit):
     kind: ClassVar[str] = "power_law"
     unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
     formula_template: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
+    _slope_note_template: ClassVar[str] = "; the slope is the exponent of the power law"
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
         """Compute the decimal logarithm of the variable.
