@@ -261,8 +261,10 @@ class Rig(HtmlTableMixin):
         Returns
         -------
         Scene
-            Dimensionless scene. By default, the field ``normal_stress`` is "imposed" if the loading
-            changes the normal stress, and "constant" otherwise.
+            Dimensionless scene. By default, the field ``normal_stress`` is "constant". If the
+            loading changes the normal stress, or if you pass ``alpha``, the default is "imposed".
+            If you pass ``phi``, the default is "variable". The default of `Scene` differs: it is
+            always "variable".
 
         Raises
         ------

@@ -66,7 +66,7 @@ class Scene(SceneFunctions, SceneQuantities):
         Normal stress condition. With "constant", normal stress is constant. With "imposed", the
         normal stress is prescribed by the loading. With "variable", the driving stress is inclined
         at the angle ``phi``, and normal stress changes with shear stress. A user-defined class is
-        also accepted.
+        also accepted. The default of ``Rig.scene`` is "constant".
     fluid : str or type, default: "drained"
         Pore fluid. With "drained", pore pressure is constant. With "dilatant", pore pressure falls
         when the slip rate increases. With "thermal", pore pressure rises when the fault heats up. A

@@ -62,7 +62,7 @@ def compute_critical_stiffness(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     quasi_static : bool, default: False
         If True, the function ignores inertia and radiation damping. The property
-        ``Scene.compute_critical_stiffness`` is computed with this option at :math:`V_*`.
+        ``Scene.critical_stiffness`` is computed with this option at :math:`V_*`.
 
     Returns
     -------

@@ -31,14 +31,15 @@ def compute_normal_stress_minus_reference(
     Notes
     -----
     If the loading changes :math:`\sigma_3` by :math:`e \sigma_*`, the relation :math:`\sigma =
-    \sigma_3 + \tau \cot\phi` gives
+    \sigma_3 + \tau_f \cot\phi` gives
 
     .. math::
 
-        \frac{\sigma}{\sigma_*} = 1 + e + \cot\phi \, \frac{\tau - \tau_*}{\sigma_*}.
+        \frac{\sigma}{\sigma_*} = 1 + e + \cot\phi \, \frac{\tau_f - \tau_*}{\sigma_*}.
 
-    Here :math:`\tau` is the frictional stress, which is the shear stress on the fault. It differs
-    from the spring stress if the slider has inertia or radiation damping.
+    Here :math:`\tau_f` is the frictional stress, which is the shear stress on the fault. It differs
+    from the spring stress if the slider has inertia or radiation damping. The stress
+    :math:`\tau_* = \mu_* \sigma_*` is its value in steady sliding at :math:`V_*`.
 
     The change in :math:`\sigma_3` does not affect shear stress.
     """
@@ -51,7 +52,7 @@ def compute_normal_stress_minus_reference(
 
 @dataclass(frozen=True, kw_only=True)
 class VariableNormalStress(NormalStressWithStateEffect):
-    r"""Normal stress coupled to shear stress by an inclined driving stress.
+    r"""Normal stress coupled to the frictional stress by an inclined driving stress.
 
     Parameters
     ----------
@@ -66,9 +67,10 @@ class VariableNormalStress(NormalStressWithStateEffect):
 
     .. math::
 
-        \sigma = \sigma_3 + \tau \cot\phi, \quad d\Theta = -\alpha \frac{d\sigma}{\sigma}.
+        \sigma = \sigma_3 + \tau_f \cot\phi, \quad d\Theta = -\alpha \frac{d\sigma}{\sigma},
 
-    Here :math:`\tau` is the frictional stress, not the spring stress.
+    where :math:`\tau_f` is the frictional stress, which differs from the spring stress if the
+    slider has inertia or radiation damping.
 
     References
     ----------
