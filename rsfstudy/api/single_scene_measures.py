@@ -102,9 +102,9 @@ def critical_step(
     The critical step depends on the instability norm of the scene, and the error does not include
     this dependence.
 
-    Under the slowness law at constant normal stress, the slip rate of every quasi-static motion with
-    :math:`k \ge k_{cr}` stays bounded [1]_. The computed step is then the smallest step after which
-    the slip rate reaches the norm, and it grows without limit with the norm.
+    Under the slowness law at constant normal stress and :math:`k \ge k_{cr}`, every quasi-static
+    motion stays bounded [1]_. The computed step is the smallest step after which the slip rate
+    reaches the norm. It grows without limit with the norm.
 
     References
     ----------

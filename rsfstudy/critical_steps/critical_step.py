@@ -131,9 +131,9 @@ class CriticalStep(Measure):
     or a displacement of :math:`D_c\,a/(b - a)`. The measure computes the boundaries of eqs. 10, 11
     and 14 of [2]_.
 
-    Under the slowness law at constant normal stress, the slip rate of every quasi-static motion with
-    :math:`k \ge k_{cr}` stays bounded [3]_. The computed step is then the smallest step after which
-    the slip rate reaches the norm, and it grows without limit with the norm.
+    Under the slowness law at constant normal stress and :math:`k \ge k_{cr}`, every quasi-static
+    motion stays bounded [3]_. The computed step is the smallest step after which the slip rate
+    reaches the norm. It grows without limit with the norm.
 
     References
     ----------

@@ -3,53 +3,53 @@
 The module defines the fields of the motion state and the columns of the tables. A kink is a
 boundary between two loading segments at which the loading rate changes, but the stress does not
 jump. The fields of ``MOTION_STATE_DTYPE`` are written by the following functions. Functions without
-a module name belong to ``motion_loop``, ``regime_starts`` or ``step_truncation``.
+a module name belong to ``motion_loop``, ``regime_starts`` or ``integration_step_truncation``.
 
-========================================  =====================================================
-Fields                                    Written by
-========================================  =====================================================
-end_time, time, slip, spring_stress       MotionDriver.iterate_events (initial values),
-                                          start_next_segment (at each kink)
-tolerance, step_limit_factor, direction,  MotionDriver.iterate_events (initial values)
+======================================== =====================================================
+Fields                                   Written by
+======================================== =====================================================
+end_time, time, slip, spring_stress      MotionDriver.iterate_events (initial values),
+                                         start_next_segment (at each kink)
+tolerance, step_limit_factor, direction, MotionDriver.iterate_events (initial values)
 budget, recording_mode, reported_kinks
-kinks_ahead                               MotionDriver.iterate_events (initial value),
-                                          start_next_segment (decremented)
-may_reverse, may_terminate, has_clock,    motion_driver.get_motion_driver (constant)
+kinks_ahead                              MotionDriver.iterate_events (initial value),
+                                         start_next_segment (decremented)
+may_reverse, may_terminate, has_clock,   motion_driver.get_motion_driver (constant)
 unknowns_behind_fluid
-has_mass, clock_is_path_length, states,   MotionDriver (constant)
+has_mass, clock_is_path_length, states,  MotionDriver (constant)
 slip_is_clock, unknowns, unknowns_fast
-starts_at_point                           motion_driver.get_motion_driver (set),
-                                          enter_initial_regime (cleared)
-regime                                    enter_initial_regime (at the start and at kinks),
-                                          advance_motion (at changes of regime)
-pending_start                             MotionDriver (START_CODE), advance_motion
-                                          (REGIME_CODE), start_next_segment (KINK_CODE),
-                                          integrate_one_regime (cleared after the first step)
-regime_start_time                         integrate_one_regime (at the end of a regime),
-                                          start_next_segment (set to 0)
-clock                                     stepper (set to 0 at the start of a regime),
-                                          move_step_begin_to_step_end
-end, step_length                          stepper (each step),
-                                          step_integration.truncate_step_at (end only)
-next_step_length                          stepper, advance_motion and start_next_segment (set to 0),
-                                          step_integration.halve_step_until_dense_output_is_accurate
-time_per_step                             stepper (each step), integrate_one_regime (set to 0)
-is_dense                                  steppers.order_eight (cleared by each step, set by the
-                                          first interpolation)
-dense_output_limit                        integrate_one_regime (at the start of a regime),
-                                          step_integration.halve_step_until_dense_output_is_accurate
-steps                                     step_integration.take_step
-evaluations_slow, evaluations_fast        workspace.count_evaluations, steppers.scipy
-jacobians                                 steppers.scipy
-target_time                               truncate_step_at_end_of_regime_or_segment,
-                                          step_samples.record_requested_samples
-event_rows, recorded_rows                 step_events.append_event_row,
-                                          step_samples.append_sample_row,
-                                          advance_motion (set to 0 in each call)
-samples_taken                             step_samples.record_requested_samples
-must_report                               integrate_one_regime (at a kink), advance_motion (cleared)
-termination, final_normal_stress          is_step_end_valid (if may_terminate is set)
-========================================  =====================================================
+starts_at_point                          motion_driver.get_motion_driver (set),
+                                         enter_initial_regime (cleared)
+regime                                   enter_initial_regime (at the start and at kinks),
+                                         advance_motion (at changes of regime)
+pending_start                            MotionDriver (START_CODE), advance_motion
+                                         (REGIME_CODE), start_next_segment (KINK_CODE),
+                                         integrate_one_regime (cleared after the first step)
+regime_start_time                        integrate_one_regime (at the end of a regime),
+                                         start_next_segment (set to 0)
+clock                                    stepper (set to 0 at the start of a regime),
+                                         move_step_begin_to_step_end
+end, step_length                         stepper (each step),
+                                         integration_steps.truncate_step_at (end only)
+next_step_length                         stepper, advance_motion and start_next_segment (set to 0),
+                                         integration_steps.halve_step_until_dense_output_is_accurate
+time_per_step                            stepper (each step), integrate_one_regime (set to 0)
+is_dense                                 steppers.order_eight (cleared by each step, set by the
+                                         first interpolation)
+dense_output_limit                       integrate_one_regime (at the start of a regime),
+                                         integration_steps.halve_step_until_dense_output_is_accurate
+steps                                    integration_steps.take_step
+evaluations_slow, evaluations_fast       workspace.count_evaluations, steppers.scipy
+jacobians                                steppers.scipy
+target_time                              truncate_step_at_end_of_regime_or_segment,
+                                         integration_step_samples.record_requested_samples
+event_rows, recorded_rows                integration_step_events.append_event_row,
+                                         integration_step_samples.append_sample_row,
+                                         advance_motion (set to 0 in each call)
+samples_taken                            integration_step_samples.record_requested_samples
+must_report                              integrate_one_regime (at a kink), advance_motion (cleared)
+termination, final_normal_stress         is_step_end_valid (if may_terminate is set)
+======================================== =====================================================
 """
 
 from __future__ import annotations
@@ -177,5 +177,5 @@ APPARENT_FRICTION, APPARENT_FRICTION_RATE, FIRST_STATE = 10, 11, 12
     INVALID_STEP,
     SEGMENT_ENDED,
 ) = range(8)
-#: Return code of ``step_integration.take_step`` for a successful step.
+#: Return code of ``integration_steps.take_step`` for a successful step.
 STEP_TAKEN_CODE = -1

@@ -1,8 +1,8 @@
 """Events of a motion: kinds of events, and specifications of requested events.
 
-The module ``step_events`` detects and locates the events. The event table lists the events in
-chronological order. For each event, it contains the slip and the point of the motion (slip rate,
-stresses and states). A measure can request the following events:
+The module ``integration_step_events`` detects and locates the events. The event table lists the
+events in chronological order. For each event, it contains the slip and the point of the motion
+(slip rate, stresses and states). A measure can request the following events:
 
     maximum(quantity), minimum(quantity)
                                 extremum of a quantity

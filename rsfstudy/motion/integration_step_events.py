@@ -1,7 +1,7 @@
 """Detection of events within a step and at jumps.
 
 ``append_events_in_step`` is called by ``motion_loop.integrate_one_regime`` after each step. The
-module ``step_conditions`` locates the events.
+module ``integration_step_root_conditions`` locates the events.
 """
 
 from __future__ import annotations

@@ -22,8 +22,9 @@ functions are called in the following order::
         enter_initial_regime           after the end of a loading segment
 
 The functions that start regimes and segments are in ``regime_starts``. The functions that take a
-step, end a step, record samples and detect events are in ``step_integration``, ``step_truncation``,
-``step_samples`` and ``step_events``, respectively.
+step, end a step, record samples and detect events are in ``integration_steps``,
+``integration_step_truncation``, ``integration_step_samples`` and ``integration_step_events``,
+respectively.
 
 The docstring of the module ``array_layout`` lists the functions that write each field of
 ``motion``. The class ``Workspace`` describes the arrays of a regime. The docstring of the module
@@ -33,7 +34,7 @@ event loop detects and locates the events in the same way for all steppers.
 The code of these modules is limited to Python features that Numba can compile. To debug a rupture,
 simulate a scene with ``inertia=True`` and ``engine="scipy"``. To debug the stages of an integration
 step, use ``engine="python"`` instead. Set a breakpoint in
-``step_truncation.truncate_step_at_end_of_regime_or_segment`` with the condition
+``integration_step_truncation.truncate_step_at_end_of_regime_or_segment`` with the condition
 ``motion.regime == 1`` (``FAST_REGIME``). The debugger then stops once in every step of the rupture.
 The arrays ``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the points of the
 motion at both ends of the step. The constant ``array_layout.LOG_SLIP_RATE`` and the constants
@@ -262,7 +263,7 @@ def integrate_one_regime(
     -------
     int
         ``REGIME_ENDED``, ``SEGMENT_ENDED``, ``MOTION_ENDED``, ``TERMINATED``, ``PAUSED``, or the
-        return code of a failed step. See ``step_integration.take_step``.
+        return code of a failed step. See ``integration_steps.take_step``.
     """
     if motion.pending_start:
         motion.time_per_step = 0.0

@@ -2,7 +2,7 @@
 
 ``motion_loop.advance_motion`` creates a workspace for each regime, and steppers receive it as an
 argument. The arrays are written by the following functions. Functions without a module name belong
-to ``motion_loop``, ``regime_starts`` or ``step_truncation``.
+to ``motion_loop``, ``regime_starts`` or ``integration_step_truncation``.
 
 =========================================  ====================================================
 Arrays                                     Written by
@@ -12,20 +12,21 @@ y                                          set_initial_unknowns_of_regime,
 rates                                      stepper (at the start of a regime),
                                            move_step_begin_to_step_end
 y_end, rates_at_end                        stepper (each step),
-                                           step_integration.truncate_step_at (y_end only)
+                                           integration_steps.truncate_step_at (y_end only)
 stage_rates, order_eight_step_block,       steppers.order_eight
 dense_output_rows
 y_within                                   stepper (each interpolation), has_rupture_regime_ended
-rates_within, point_within                 step_integration.evaluate_point_within_step,
-                                           step_integration.is_dense_output_accurate (rates_within),
+rates_within, point_within                 integration_steps.evaluate_point_within_step,
+                                           integration_steps.is_dense_output_accurate
+                                           (rates_within),
                                            has_rupture_regime_ended (point_within)
-dense_slopes                               step_integration.is_dense_output_accurate
+dense_slopes                               integration_steps.is_dense_output_accurate
 point_at_begin                             integrate_one_regime (at its start),
                                            move_step_begin_to_step_end
 point_at_end                               integrate_one_regime (each step),
                                            repeat_step_to_segment_end_time,
-                                           step_integration.truncate_step_at
-event_clocks, event_specs                  step_events.locate_events_in_step
+                                           integration_steps.truncate_step_at
+event_clocks, event_specs                  integration_step_events.locate_events_in_step
 parameters, parameters_before              start_next_segment
 =========================================  ====================================================
 """

@@ -12,10 +12,10 @@ We suggest reading the other modules in the following order:
 
 - ``scene`` combines the parts of a slider.
 - ``friction_relation`` defines the relation between stress, slip rate and states, and
-  ``state_functions`` defines functions of the state variables. ``temperature_functions`` adds the
-  effects of a changing temperature.
+  ``state_variable_functions`` defines functions of the state variables. ``temperature_functions``
+  adds the effects of a changing temperature.
 - ``rate_functions`` and ``motion_point_functions`` build the equations of motion from friction and
-  from the dynamics. ``path_length`` defines the independent variable.
+  from the dynamics. ``integration_path_length`` defines the independent variable.
 - ``steady_state`` and ``stability`` compute steady sliding and its linear stability from the
   friction relation.
 - ``closed_forms`` contains published closed-form solutions.

@@ -13,7 +13,7 @@ independent variable :math:`\delta` is slip plus load point displacement,
 The dynamics of the scene determine the slip rate from :math:`f` and :math:`\Psi`. In ruptures, the
 equations of motion include inertia. The independent variable of these equations is inertial time,
 which is time in units of :math:`T/(2 \pi)`. In both regimes, the integrators use path length as the
-independent variable (see the module ``path_length``).
+independent variable (see the module ``integration_path_length``).
 
 For a rigid slider, the slip rate is prescribed, and slip is the independent variable.
 """

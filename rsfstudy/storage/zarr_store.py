@@ -1,9 +1,9 @@
 """Writing of Zarr stores, for lattices that do not fit in memory.
 
-Zarr stores need the optional dependency ``rsfstudy[zarr]``. ``ZarrStore.write`` writes a lattice
-slab by slab under a temporary name, reads each slab back, and finally renames the store. An
-existing store is never replaced, because a program that has opened the store would read a mixture
-of old and new chunks.
+Zarr stores need the optional dependency ``rsfstudy[zarr]``. ``ZarrStore.write_study_results``
+writes a lattice slab by slab under a temporary name, reads each slab back, and finally renames the
+store. An existing store is never replaced, because a program that has opened the store would read a
+mixture of old and new chunks.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ _SAFETY_FACTOR, _MIN_FACTOR, _MAX_FACTOR, _ERROR_EXPONENT = 0.9, 0.2, 10.0, -1.0
 def begin_integration_of_regime(motion, workspace):
     """Evaluate the initial derivatives, and select the first step size.
 
-    See ``Stepper.begin_integration_of_regime``.
+    See ``Stepper.begin_regime``.
 
     Parameters
     ----------
