@@ -64,7 +64,10 @@ class Status(IntEnum):
     NOT_APPLICABLE = 14, "the result is not defined for this scene"
     ACCURACY_OUT_OF_REACH = (
         15,
-        ("the integrator did not reach the requested accuracy within the permitted work"),
+        (
+            "the integrator did not reach the requested accuracy within the permitted work, or "
+            "the search of a fit did not converge"
+        ),
     )
     SLIP_STOPPED = 16, "the slider is not loaded, and its slip rate falls below 10^-290 V_*"
     NOT_PERIODIC = (

@@ -43,7 +43,7 @@ LOAD_HELD = {"load_velocity_ratio": 0.0}
 #: Measures and scenes, with the expected status and message.
 ENDS = [
     (UP, {"instability_norm": 5e-9}, Status.NORM_BELOW_LOADING_RATE,
-     "because its norm is 9.31e-09. Pass a value of instability_norm="),
+     "because V_* T/(2 pi D_c) is 9.31e-09. Pass a value of instability_norm="),
     (UP, {"stiffness_ratio": 0.8}, Status.UNSTABLE_AT_ANY_STEP, ""),
     (UP, {"inertia": True, "instability_norm": 1e3}, Status.NORM_UNREACHABLE, ""),
     (CriticalStep(of="displacement_step", direction="down"), {}, Status.STABLE_FOR_ALL_STEPS, ""),

@@ -58,10 +58,11 @@ def build_norm_below_load_velocity_outcome(scene: Scene, load_velocity: float = 
         Outcome with the status ``norm_below_loading_rate`` and a remedy.
     """
     norm, least = scene.instability_norm, scene.inertial_time * max(1.0, abs(load_velocity))
+    velocity = "V_0" if abs(load_velocity) > 1.0 else "V_*"
     return Outcome(
         Status.NORM_BELOW_LOADING_RATE,
         message=f"the load point velocity already exceeds the instability norm {norm:g}, because "
-        f"its norm is {least:.3g}. Pass a value of instability_norm= well above "
+        f"{velocity} T/(2 pi D_c) is {least:.3g}. Pass a value of instability_norm= well above "
         f"{least:.3g}, or a value of period= (now {scene.period:g} s) well below "
         f"{scene.period * norm / least:.3g} s",
     )

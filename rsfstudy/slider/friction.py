@@ -3,7 +3,8 @@ r"""Friction functions of a scene, built from the parts of the scene.
 `build_friction_functions` combines the law, the normal stress condition, the fluid and the loading
 of a scene. The module ``friction_relation`` defines the friction relation between the frictional
 stress g, the slip rate and the states. The module ``state_variable_functions`` defines the
-functions of the states. The friction functions include only the effects that are active in the scene.
+functions of the states. The friction functions include only the effects that are active in the
+scene.
 
 The pore pressure :math:`P`, divided by :math:`\sigma_*`, reduces the effective normal stress, so
 :math:`s = \sigma/\sigma_* - P`. Friction, and the effects of stress on the state, depend on
