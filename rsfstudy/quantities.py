@@ -47,7 +47,7 @@ class Quantity:
     --------
     >>> from rsfstudy.measures import Quantity
     >>> recurrence = Quantity("recurrence", "$t_r$", "1", "recurrence interval", scale="D_c/V_*")
-    >>> recurrence.attributes
+    >>> recurrence.variable_attributes
     {'long_name': 'recurrence interval', 'units': '1', 'scale': 'D_c/V_*'}
     """
 

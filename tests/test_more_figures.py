@@ -92,6 +92,19 @@ def test_nothing_is_drawn_where_nothing_came_out():
     assert len(plots.draw_figure(dataset, panels).axes) == 1
 
 
+def test_failed_cells_of_lines_are_marked():
+    """A cross marks the position of a failed cell without a value, but not of an answer."""
+    axes = [Axis("phi", [50.0, 55.0, 60.0, 65.0])]
+    dataset = run(Study(name="n", title="", base=Scene(), axes=axes, measure=LinearStability()))
+    dataset["critical_stiffness"].values[1:3] = np.nan
+    dataset["status"].values[1:3] = int(Status.WORK_BUDGET_SPENT), int(Status.NO_STEADY_STATE)
+    by_default = rsfstudy.Figure(lines.build_line_panels(dataset, "critical_stiffness"))
+    for figure in (by_default, rsfstudy.Figure([Panel(x="phi", y="critical_stiffness")])):
+        (axes_drawn,) = plots.draw_figure(dataset, figure).axes
+        (crosses,) = [line for line in axes_drawn.lines if line.get_label() == "failed cell"]
+        assert crosses.get_xdata().tolist() == [55.0]
+
+
 def test_where_nothing_was_measured_the_statuses_are_drawn():
     dataset = stiffnesses()
     numbers = [n for n, values in dataset.data_vars.items() if values.dtype.kind == "f"]

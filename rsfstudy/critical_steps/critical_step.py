@@ -258,18 +258,15 @@ class CriticalStep(Measure):
             not stability_after_step.has_closed_orbits_at_critical_stiffness(scene)
             or stability_after_step.compute_stiffness_ratio_after_step(scene) < 1.0
         )
+        tolerance = integrator.result_tolerance(10.0)
         if (
             below
             and stability_after_step.has_frictional_damping_only(scene)
             and stability_after_step.is_neutrally_stable(
-                steps.build_scene_with_step(steps.max_size), integrator.result_tolerance(10.0)
+                steps.build_scene_with_step(steps.max_size), tolerance
             )
         ):
-            return Outcome(
-                Status.UNVERIFIED,
-                message="the stiffness is equal to the critical stiffness within the accuracy. "
-                "Use a smaller rtol",
-            )
+            return _make_outcome_of_neutral_stability(tolerance)
         if not scene.critical_stiffness:
             # Perturbations do not grow, so only the step itself can reach the norm.
             return self._search_with_increasing_step_size(steps, integrator)
@@ -544,6 +541,16 @@ def _compute_log_rate_above_norm_after_step(
         if halt.status is Status.WORK_BUDGET_SPENT:
             raise
         return None
+
+
+def _make_outcome_of_neutral_stability(tolerance: float) -> Outcome:
+    """Build the outcome of a scene in which small perturbations neither grow nor decay."""
+    message = (
+        f"the stiffness differs from the critical stiffness by less than {tolerance:.1g}, so the "
+        "growth of perturbations is not known. Use another stiffness, for example "
+        "stiffness_ratio=1.001. If the difference is not 0, you can also use a smaller rtol"
+    )
+    return Outcome(Status.UNVERIFIED, message=message)
 
 
 def _compute_massless_critical_step_size(

@@ -94,7 +94,7 @@ class FitWindow:
     >>> displacement = np.where(time < 50.0, time, 50.0 + 10.0 * (time - 50.0))
     >>> friction = np.full(200, 0.6)
     >>> record = Record({"time": time, "displacement": displacement, "friction": friction})
-    >>> window = FitWindow(record, step_number=1, displacement_before=30.2)
+    >>> window = FitWindow(record, step_number=1, displacement_before_step=30.2)
     >>> float(record.time[window.record_row_indices[0]])
     20.0
     """

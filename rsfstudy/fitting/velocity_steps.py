@@ -81,7 +81,7 @@ class LoadingStep(NamedTuple):
     >>> step = LoadingStep(50.0, 51.0, 1.0, 10.0, stress_before=10e6, stress_after=12e6)
     >>> step.changes_velocity
     True
-    >>> step.stress_ratio
+    >>> step.normal_stress_ratio
     1.2
     """
 

@@ -163,9 +163,11 @@ class LimitCycle(RecordingMeasure):
     -----
     With radiation damping, the limit of the peak slip rate is :math:`a \sigma_*/\eta`. At the slip
     rate :math:`a \sigma_*/\eta`, a small change in slip rate changes the radiated stress and the
-    direct effect of friction by the same amount. Without radiation damping, the limit is the
-    instability norm. A motion settles with oscillations if the slowest-decaying perturbations of
-    steady sliding have complex eigenvalues.
+    direct effect of friction by the same amount. Without radiation damping, the limit is the slip
+    rate at the instability norm. If this slip rate is below the load point velocity, as it may be
+    for laboratory machines with small periods, ``slip_mode`` is ``stick_slip`` for every cycle. To
+    use another limit, call ``dataset.rsf.slip_mode(limit)``. A motion settles with oscillations if
+    the slowest-decaying perturbations of steady sliding have complex eigenvalues.
 
     The error estimates are based on two computations of the cycle with different tolerances. The
     error estimates also include the correction of each result for the closure error, which is the

@@ -35,6 +35,7 @@ from rsfstudy.plots._style import (
     cycle_marker,
     cycle_style,
     estimate_text_capacity_in_characters,
+    mark_failed_cells,
 )
 from rsfstudy.plots._text_formatting import convert_symbols_to_mathtext, format_slope, wrap_text
 from rsfstudy.status import Status
@@ -359,6 +360,8 @@ def _draw_curve(
     if panel.error_bars:
         bars = {"fmt": "none", "ecolor": style["color"], "elinewidth": 0.8, "capsize": 3}
         axes.errorbar(x, y, _evaluate_variable_or_function(panel.error_bars, curve_data), **bars)
+    if (status := curve_data.get("status")) is not None and np.shape(status) == y.shape:
+        mark_failed_cells(status.values, x, y, axes)
     return y
 
 

@@ -31,6 +31,7 @@ from rsfstudy.errors import InvalidValue, RsfStudyError, shorten_text
 from rsfstudy.exception_conversion import check_regular_file
 from rsfstudy.plots._figure_size import figure_width_context
 from rsfstudy.plots._text_formatting import estimate_visible_character_count, wrap_text
+from rsfstudy.status import Status
 
 #: Default style sheet of rsfstudy.
 DEFAULT_STYLE_SHEET_PATH = Path(__file__).with_name("rsfstudy.mplstyle")
@@ -272,6 +273,32 @@ def estimate_text_capacity_in_characters(axes: Axes) -> tuple[int, int]:
 
 
 # ---- legends ------------------------------------------------------------------------------------
+
+
+def mark_failed_cells(
+    status_codes: np.ndarray, x: np.ndarray, values: np.ndarray, axes: Axes
+) -> None:
+    """Mark failed cells with crosses at the lower edge of the axes.
+
+    Without the crosses, a failed cell would be visible only as a gap in its curve.
+
+    Parameters
+    ----------
+    status_codes : ndarray, shape (n, ...)
+        Status codes of the cells along x.
+    x : ndarray, shape (n,)
+        Positions along x.
+    values : ndarray, shape (n, ...)
+        Displayed values. Failed cells that have a value are not marked.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
+    failed = (status_codes >= Status.WORK_BUDGET_SPENT) & ~np.isfinite(values)
+    marked = x[failed.reshape(x.size, -1).any(axis=1)]
+    if marked.size:
+        lower_edge = axes.get_xaxis_transform()
+        (crosses,) = axes.plot(marked, np.zeros(marked.size), "kx", transform=lower_edge)
+        crosses.set(label="failed cell", clip_on=False, markersize=4, markeredgewidth=0.8)
 
 
 def add_legend(axes: Axes, legend_column_count: int = 2, title: str | None = None) -> None:

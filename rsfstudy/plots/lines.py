@@ -27,7 +27,12 @@ from rsfstudy.plots._axis_formatting import (
     read_flag_meanings_of_variable,
     set_up_x_axis_for_dimension,
 )
-from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
+from rsfstudy.plots._style import (
+    add_grey_legend_entry,
+    cycle_marker,
+    cycle_style,
+    mark_failed_cells,
+)
 from rsfstudy.plots._text_formatting import convert_symbols_to_mathtext
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Panel
@@ -120,6 +125,10 @@ def _draw_lines_of_variable(
         for row, colour in zip(_iterate_values_at_points(group, [coloured]), shades, strict=True):
             axes.plot(x, row.values, **style | {"color": colour})
             style["label"] = None
+    if x_dimension in dataset["status"].dims:
+        status, found = xr.broadcast(dataset["status"], values)
+        along = (x_dimension, ...)
+        mark_failed_cells(status.transpose(*along).values, x, found.transpose(*along).values, axes)
     if coloured is not None:
         add_colour_bar_of_dimension(dataset, axes, coloured)
     if numeric and are_log_spaced(x):

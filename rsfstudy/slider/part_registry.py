@@ -195,6 +195,14 @@ def collect_scene_field_defaults() -> dict[str, Any]:
     }
 
 
+class _UnsetDefault:
+    """Default in signatures of keyword arguments that may be omitted."""
+
+    def __repr__(self) -> str:
+        """Return the text that ``help`` displays."""
+        return "<unset>"
+
+
 def add_scene_fields_to_signature(
     *extra_field_names: str,
 ) -> Callable[[DecoratedFunction], DecoratedFunction]:
@@ -218,7 +226,8 @@ def add_scene_fields_to_signature(
         stated = signature(function)
         *first, last = stated.parameters.values()
         names = (*collect_scene_field_defaults(), *extra_field_names)
-        fields = [Parameter(name, Parameter.KEYWORD_ONLY, default=...) for name in names]
+        unset = _UnsetDefault()
+        fields = [Parameter(name, Parameter.KEYWORD_ONLY, default=unset) for name in names]
         function.__signature__ = stated.replace(parameters=[*first, *fields, last])  # type: ignore[attr-defined]
         return function
 

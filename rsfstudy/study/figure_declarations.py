@@ -180,7 +180,7 @@ class Figure:
     --------
     >>> from rsfstudy import Figure, Panel
     >>> figure = Figure([Panel(x="b_over_a", y="critical_displacement", hue=["phi"])])
-    >>> sorted(figure.dimensions)
+    >>> sorted(figure.used_dimension_names)
     ['b_over_a', 'phi']
     """
 
