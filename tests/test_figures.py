@@ -27,6 +27,7 @@ from rsfstudy.quantities import Quantity
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.storage import dataset_files
 from rsfstudy.study import named_study_index
+from rsfstudy.vocabulary import find_quantity
 
 MM = 25.4
 #: Permitted apparent overlap in inches. Text extents use the height of the tallest letters,
@@ -467,3 +468,18 @@ def test_units_stay_with_the_last_word(units):
     for width in range(8, 60):
         last = _text_formatting.format_quantity_axis_label(about, width).split("\n")[-1]
         assert re.match(r"(?!\().*\(.*\)$", last)
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "label"),
+    [
+        ("b_over_a", 60, "Ratio of evolution effect to direct effect, $b/a$"),
+        ("b_over_a", 40, "$b/a$"),
+        ("critical_velocity_ratio", 60, "Critical load point velocity, $V_0/V_*$"),
+        ("critical_velocity_ratio", 30, "Critical velocity, $V_0/V_*$"),
+        ("critical_displacement", 20, "Critical\ndisplacement, $\\Delta\\delta_0/D_c$"),
+    ],
+)
+def test_a_label_that_does_not_fit_on_one_line_is_shortened(name, width, label):
+    """Labels without a shorter form are wrapped."""
+    assert _text_formatting.format_quantity_axis_label(find_quantity(name), width) == label

@@ -65,6 +65,10 @@ _SHORT_AXIS_LABEL_BY_QUANTITY = {
     "stiffness_ratio": "stiffness",
 }
 
+#: Shorter names of quantities, for axis labels that would otherwise need several lines. An empty
+#: name means that the label consists of the symbol only.
+_AXIS_LABEL_IF_NARROW_BY_QUANTITY = {"b_over_a": "", "critical_velocity_ratio": "critical velocity"}
+
 
 def convert_symbols_to_mathtext(text: Any) -> str:
     """Convert the symbols in a string to mathtext.
@@ -178,7 +182,8 @@ def format_quantity_axis_label(quantity: Quantity, max_line_characters: int = 45
     quantity : Quantity
         Quantity along the axis.
     max_line_characters : int, default: 45
-        Maximum number of visible characters per line.
+        Maximum number of visible characters per line. Some quantities have a shorter name, which is
+        used if the label does not fit on one line.
 
     Returns
     -------
@@ -187,6 +192,15 @@ def format_quantity_axis_label(quantity: Quantity, max_line_characters: int = 45
         scale instead of units.
     """
     words = _SHORT_AXIS_LABEL_BY_QUANTITY.get(quantity.name, quantity.long_name.split(":")[0])
+    label = _format_axis_label_with_name(quantity, words, max_line_characters)
+    if "\n" in label and quantity.symbol and quantity.name in _AXIS_LABEL_IF_NARROW_BY_QUANTITY:
+        words = _AXIS_LABEL_IF_NARROW_BY_QUANTITY[quantity.name]
+        label = _format_axis_label_with_name(quantity, words, max_line_characters)
+    return label
+
+
+def _format_axis_label_with_name(quantity: Quantity, words: str, max_line_characters: int) -> str:
+    """Return an axis label that starts with the given name of a quantity."""
     text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", quantity.symbol)))
     units = (
         quantity.units

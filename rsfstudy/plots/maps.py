@@ -35,6 +35,7 @@ from rsfstudy.plots._axis_formatting import (
     list_numeric_result_variables,
     read_flag_meanings_of_variable,
 )
+from rsfstudy.plots._style import estimate_text_capacity_in_characters
 from rsfstudy.plots._text_formatting import convert_symbols_to_mathtext, format_number
 from rsfstudy.status import Status
 from rsfstudy.study import Panel
@@ -85,9 +86,9 @@ def build_map_panels(dataset: xr.Dataset, variable: str | None = None) -> Sequen
         Panel,
         x=plane[1],
         overlays=[
-            partial(draw_map, names[0], plane, _choose_colour_scale_and_contour_levels(values))
+            partial(draw_map, names[0], plane, _choose_colour_scale_and_contour_levels(values)),
+            partial(_label_y_axis, plane[0]),
         ],
-        y_label=format_axis_label(dataset, plane[0], 200),
         title=None if others else convert_symbols_to_mathtext(dataset.attrs.get("title", "")),
         legend_title=format_axis_label(dataset, names[0], 60)
         if read_flag_meanings_of_variable(values)
@@ -187,6 +188,12 @@ def _choose_colour_scale_and_contour_levels(
     if low < 0.0 < high:
         return CenteredNorm(0.0, max(-low, high)), MaxNLocator(8).tick_values(low, high)
     return Normalize(low, high), MaxNLocator(8).tick_values(low, high)
+
+
+def _label_y_axis(dimension: str, dataset: xr.Dataset, axes: Axes) -> None:
+    """Label the y axis of a map, with a short label if the panel is small."""
+    _across, up = estimate_text_capacity_in_characters(axes)
+    axes.set_ylabel(format_axis_label(dataset, dimension, up))
 
 
 # ---- contents of a map --------------------------------------------------------------------------
