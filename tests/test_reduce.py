@@ -80,6 +80,7 @@ def test_a_slope_per_decade_is_that_over_the_logarithm():
     result, expected = apply_reductions(lattice(values), (fit,)), linregress(np.log10(X), values)
     assert float(result.rate) == pytest.approx(expected.slope, rel=1e-12)
     assert float(result.rate_stderr) == pytest.approx(expected.stderr, rel=1e-12)
+    assert result.rate.attrs["comment"].endswith("per decade of a_over_b_minus_a")
     moved = lattice(values).assign_coords(a_over_b_minus_a=("b_over_a", [0.0, *X[1:]]))
     result, expected = apply_reductions(moved, (fit,)), linregress(np.log10(X[1:]), values[1:])
     assert float(result.rate) == pytest.approx(expected.slope, rel=1e-12)
