@@ -28,6 +28,7 @@ from synthetic_records import (
 import rsfstudy
 from rsfstudy import Axis, Scene
 from rsfstudy.errors import IncompleteWarning, InvalidValue
+from rsfstudy.fitting import posterior
 from rsfstudy.fitting.joint_window_model import JointWindowModel
 from rsfstudy.fitting.window_model import WindowModel
 from rsfstudy.motion.accuracy import Accuracy
@@ -407,6 +408,40 @@ def test_a_chain_that_is_too_short_is_refused() -> None:
         fit = rsfstudy.fit(one, posterior=100, budget=enough, **options)
     assert fit.rsf.fit_table().status.item() == "work_budget_spent"
     assert np.isnan(fit.posterior).all()
+    # The values of the fit were computed before the budget was exhausted.
+    assert abs(deviation_in_stderrs(fit.squeeze(), "a", EXACT_PARAMETERS["a"])) < 4.0
+    assert "no posterior draws, because" in fit.message.item()
+
+
+def test_an_error_of_the_sampler_keeps_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_arguments: object) -> None:
+        raise ValueError("walkers are linearly dependent")
+
+    one, options = synthetic_record(seed=4, count=200), {"laws": ["slowness"], **FIT_OPTIONS}
+    without = rsfstudy.fit(one, **options)
+    monkeypatch.setattr(posterior, "sample_posterior_fit_coordinates", fail)
+    fit = rsfstudy.fit(one, posterior=20, **options)
+    assert fit.message.item().endswith(
+        "no posterior draws, because emcee raised ValueError: walkers are linearly dependent"
+    )
+    assert np.isnan(fit.posterior).all()
+    assert np.isnan(fit.autocorrelation_time).all()
+    for name in ("status", "a", "a_ci_low", "residual"):
+        assert fit[name].equals(without[name]), name
+    with pytest.raises(InvalidValue, match="no posterior draws.*walkers are linearly dependent"):
+        fit.rsf.sample_parameters(5, posterior=True)
+
+
+def test_a_fit_without_constraint_is_kept_without_draws() -> None:
+    """The walkers of emcee are linearly dependent because the slip distances are unconstrained."""
+    one, options = synthetic_record(seed=4, count=200), {"laws": ["two_slip_states"], **FIT_OPTIONS}
+    fit = rsfstudy.fit(one, posterior=20, **options)
+    assert fit.rsf.fit_table().status.item() == "not_identified"
+    assert abs(fit.a.item() - EXACT_PARAMETERS["a"]) < 1e-3
+    assert np.isnan(fit.posterior).all()
+    assert re.search(
+        "no posterior draws, because b1.* and .* are not identified", str(fit.message.item())
+    )
 
 
 def test_a_posterior_without_emcee_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
