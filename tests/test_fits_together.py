@@ -28,12 +28,14 @@ from synthetic_records import (
 import rsfstudy
 from rsfstudy import Axis, Scene
 from rsfstudy.errors import IncompleteWarning, InvalidValue
-from rsfstudy.fitting import posterior
+from rsfstudy.fitting import Fit, posterior
 from rsfstudy.fitting.joint_window_model import JointWindowModel
 from rsfstudy.fitting.window_model import WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.integrator import Integrator
+from rsfstudy.reporting import TextTable
+from rsfstudy.reporting.fit_summaries import summarise_fits
 from rsfstudy.storage.dataset_files import write_dataset
 
 ENOUGH = 10**9
@@ -55,6 +57,38 @@ def test_two_steps_of_a_record_share_a_law() -> None:
         assert abs(deviation_in_stderrs(both, name, value)) < 4.0, name
     for name in SHARED:
         assert both[f"{name}_stderr"] < alone[f"{name}_stderr"].min(), name
+
+
+def test_tables_of_a_joint_fit_with_a_law_that_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Missing values are dashes in all tables, whichever of the laws failed."""
+
+    def solve_unless_failed(self: Fit, scene: Scene, integrator: Integrator) -> object:
+        if scene.law in failing:
+            raise ValueError("failed")
+        return solve(self, scene, integrator)
+
+    solve = Fit.solve
+    monkeypatch.setattr(Fit, "solve", solve_unless_failed)
+    one = synthetic_record(STEP_UP_AND_BACK, seed=1, count=200)
+    columns = {**one.columns, "normal_stress": np.full(len(one), 20.0)}
+    stressed = rsfstudy.read_record(columns).with_steps(one.loading_steps)
+    for failing in (("slip",), ("slowness",), ("slip", "slowness")):
+        with pytest.warns(IncompleteWarning):
+            fit = rsfstudy.fit(
+                stressed, laws=["slip", "slowness"], together=True, posterior=0, **FIT_OPTIONS
+            )
+        table = next(part for part in summarise_fits(fit) if isinstance(part, TextTable))
+        for row in table.rows[:-1]:
+            for law in ("slip", "slowness"):
+                expected = law in failing
+                if row["parameter"] not in ("k (1/um)", "normal stress (MPa)") or expected:
+                    assert (row[law] == "-") is expected, row
+        assert [row["parameter"] for row in table.rows][-6:-5] == (
+            ["normal stress (MPa)"] if len(failing) < 2 else ["k (1/um)"]
+        )
+        rows = fit.rsf.fit_table().set_index("law")
+        assert (rows.loc[[*failing], "window"] == "").all()
+        assert rows.loc[[*failing], ["a", "k", "V0"]].isna().all(axis=None)
 
 
 def test_one_step_together_is_that_step() -> None:

@@ -18,7 +18,7 @@ from rsfstudy.reporting.fit_tables import (
     find_stderr_of_fixed_stiffness,
     split_into_single_fits,
 )
-from rsfstudy.reporting.text_tables import TextTable
+from rsfstudy.reporting.text_tables import TextTable, format_number_or_dash
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 
@@ -117,8 +117,11 @@ def _build_summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
 def _build_parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
     """Return a table of the parameters with one column per fit."""
     columns = {str(one["law"].item()): _build_parameter_column(one) for one in fits}
-    headings = next(iter(columns.values()))
-    rows = [{"parameter": h, **{law: c[h] for law, c in columns.items()}} for h in headings]
+    # A law that could not be fitted has no normal stress, so its column is shorter.
+    headings = max(columns.values(), key=len)
+    rows = [
+        {"parameter": h, **{law: c.get(h, "-") for law, c in columns.items()}} for h in headings
+    ]
     windows = (_describe_fit_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
     return TextTable(rows, "\n".join(filter(None, (table_title, next(windows, "")))))
 
@@ -133,7 +136,11 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
     }
     if "window_stiffness" in fit and "stiffness" not in fit["parameter"].values:
         value, stderr = fit["window_stiffness"].item(), find_stderr_of_fixed_stiffness(fit)
-        text = format_value_with_stderr(value, stderr) if stderr else f"{value:.6g}"
+        text = (
+            format_value_with_stderr(value, stderr)
+            if stderr
+            else format_number_or_dash(value, ".6g")
+        )
         found["k" + _format_units_in_brackets("stiffness")] = text
     stresses = [f"{stress:.6g}" for stress in find_normal_stresses_in_mpa(fit).values()]
     if stresses:
@@ -246,10 +253,10 @@ def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     if each := ", ".join(f"{n} {value:.2g}" for n, value in spreads if not math.isnan(value)):
         yield f"{law}: range of the parameters over the windows: {each}"
     if "posterior" in fit and math.isfinite(fit["autocorrelation_time"].item()):
-        drawn = fit["posterior"].quantile([0.025, 0.975], "draw")
+        drawn = fit["posterior"].dropna("parameter", how="all").quantile([0.025, 0.975], "draw")
         each = ", ".join(
             f"{short[str(of.parameter.values)]} {of.values[0]:.4g} to {of.values[1]:.4g}"
-            for of in drawn.dropna("parameter").transpose("parameter", ...)
+            for of in drawn.transpose("parameter", ...)
         )
         time = f"{fit['autocorrelation_time'].item():.2g} steps"
         yield f"{law}: 95 % credible intervals: {each} (autocorrelation time {time})"

@@ -207,7 +207,8 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
             units |= dict.fromkeys(
                 ("k", "k_stderr"), read_units_or_reference_scale(one["window_stiffness"].attrs)
             )
-        row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
+        ends = [one[f"window_{end}"].item() for end in ("begins", "ends")]
+        row["window"] = " to ".join(f"{x:g}" for x in ends if math.isfinite(x))
         row["R2"], row["aic"] = one["r_squared"].item(), one["aic"].item()
         row["p_value"], row["status"] = one["p_value"].item(), find_status_label_of_fit(one)
         rows.append(row)
