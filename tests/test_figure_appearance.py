@@ -297,6 +297,32 @@ def test_samples_are_a_corner_plot():
     assert isinstance(corner_plots.build_corner_figure(dataset), corner_plots.CornerFigure)
 
 
+@pytest.mark.parametrize(("count", "omitted"), [(4, ""), (6, ""), (7, "alpha")])
+def test_a_corner_plot_shows_up_to_six_fields_and_names_the_others(count, omitted):
+    uniform = np.random.default_rng(1).uniform
+    ends = {"a": (0.008, 0.012), "b_over_a": (1.4, 1.7), "mu_star": (0.6, 0.7)}
+    ends |= {"load_velocity_ratio": (1.0, 10.0), "phi": (45.0, 85.0)}
+    ends |= {"radiation_damping": (1e-4, 1e-3), "alpha": (0.2, 0.5)}
+    fields = list(ends)[:count]
+    table = {name: uniform(*ends[name], size=40) for name in fields}
+    dataset = lattice(Axis.cases(table, dimension="sample"), Axis("law", ["slip", "slowness"]))
+    drawn = plots.draw_figure(dataset)
+    assert len(drawn.axes) == (min(count, 6) + 1) * (min(count, 6) + 2) // 2
+    notes = [text for axes in drawn.axes for text in axes.texts]
+    assert [note.get_text() for note in notes] == ([f"Not shown: {omitted}"] if omitted else [])
+    drawn.draw_without_rendering()
+    for note in notes:  # The note is in the empty corner above the panels.
+        box = note.get_window_extent()
+        assert drawn.bbox.contains(box.x1, box.y1)
+        assert not any(box.overlaps(axes.get_window_extent()) for axes in drawn.axes)
+        note.remove()
+    # One legend of the laws, and no overlapping tick labels in the narrow panels.
+    assert [axes for axes in drawn.axes if axes.get_legend()] == []
+    (legend,) = drawn.legends
+    assert len(legend.get_texts()) == 2
+    checks.assert_printable(drawn)
+
+
 def test_a_field_of_a_corner_plot_is_drawn_once_with_its_symbol():
     normal = np.random.default_rng(1).normal
     table = {"a": 0.01 + 1e-3 * normal(size=40), "b_over_a": 2.0 + 0.1 * normal(size=40)}
@@ -351,6 +377,11 @@ def test_posterior_draws_are_a_corner_plot():
     assert figure.subplot_positions == [0, 2, 3]
     assert figure.panels[1].y_label == r"$D_c$ ($\mu$m)"
     assert np.array_equal(drawn.slip_distance, dataset.posterior[:, 1])
+    dataset["posterior"][:, 1] = np.nan
+    assert corner_plots.build_posterior_corner_figure(dataset)[0].columns == 1
+    dataset["posterior"][:] = np.nan
+    with pytest.raises(InvalidValue, match=r"has no draws in this fit.*message"):
+        corner_plots.build_posterior_corner_figure(dataset)
 
 
 def test_integrators_have_distinct_colours():
