@@ -296,6 +296,25 @@ def test_the_table_has_the_columns_of_laboratories() -> None:
     assert columns <= set(table.columns)
     assert table.law.tolist() == ["slip", "slowness"]
     assert table.Dc.tolist() == fit.slip_distance.values.ravel().tolist()
+    for column, name in (("a", "a"), ("Dc", "slip_distance")):
+        for end in ("ci_low", "ci_high"):
+            assert table[f"{column}_{end}"].tolist() == fit[f"{name}_{end}"].values.ravel().tolist()
+    assert table.attrs["units"]["Dc_ci_low"] == "um"
+    assert "a_minus_b_ci_low" not in table
+
+
+@pytest.mark.parametrize(("freedom", "half_width"), [(3.0, "3.2"), (5.0, "2.6"), (8.0, "")])
+def test_wide_intervals_are_printed_below_the_table(freedom: float, half_width: str) -> None:
+    """The 97.5 % quantile of Student's t distribution is 3.18, 2.57 and 2.31."""
+    fit = rsfstudy.fit(synthetic_record(seed=4, count=200), laws=["slowness"], **FIT_OPTIONS)
+    fit["degrees_of_freedom"][:] = freedom
+    assert fit.rsf.fit_table().status.item() == "ok"
+    found = [part for part in summarise_fits(fit) if isinstance(part, str) and "half-width" in part]
+    assert len(found) == bool(half_width)
+    for sentence in found:
+        low, high = fit.slip_distance_ci_low.item(), fit.slip_distance_ci_high.item()
+        assert f"about {half_width} standard errors" in sentence
+        assert f"Dc {low:.4g} to {high:.4g}" in sentence
 
 
 def test_a_window_does_not_begin_within_a_hold() -> None:

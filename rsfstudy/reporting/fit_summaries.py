@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.stats import t as student_t
 
 from rsfstudy.fitting import PARAMETERS, describe_whiteness, split_window_number
 from rsfstudy.reporting.fit_tables import (
@@ -32,6 +33,9 @@ _MAX_PRINTED_RELATIVE_ERROR = 1e4
 #: If the AIC values of two friction laws differ by more than this limit, the comparison of the laws
 #: is decisive.
 _DECISIVE_AIC_DIFFERENCE = 10.0
+#: Smallest half-width of the confidence intervals, in standard errors, at which a remark lists the
+#: confidence intervals.
+_MIN_REPORTED_HALF_WIDTH_IN_STDERRS = 2.5
 #: Symbol that marks invalid standard errors.
 _MARK_OF_INVALID_STDERRS = "*"
 
@@ -235,10 +239,36 @@ def format_value_with_stderr(value: float, stderr: float) -> str:
     return f"({value / scale:z.{digits}f} +- {stderr / scale:.{digits}f})e{size:+03d}"
 
 
+def _describe_wide_confidence_intervals(fit: xr.Dataset) -> Iterator[str]:
+    """Yield a sentence with the confidence intervals if the fit has few degrees of freedom.
+
+    The intervals are then much wider than two standard errors. Fits with unconstrained parameters
+    or invalid standard errors are omitted.
+    """
+    freedom = fit["degrees_of_freedom"].item() if "degrees_of_freedom" in fit else math.nan
+    half_width = float(student_t.ppf(0.975, freedom)) if freedom > 0.0 else math.nan
+    if (
+        find_status_label_of_fit(fit) != Status.OK.label
+        or not half_width >= _MIN_REPORTED_HALF_WIDTH_IN_STDERRS
+    ):
+        return
+    ends = (
+        (heading, fit[f"{name}_ci_low"].item(), fit[f"{name}_ci_high"].item())
+        for name, heading in find_parameter_headings(fit).items()
+        if f"{name}_ci_low" in fit
+    )
+    each = ", ".join(f"{n} {low:.4g} to {high:.4g}" for n, low, high in ends if math.isfinite(low))
+    yield (
+        f"{fit['law'].item()}: the fit has {freedom:.2g} degrees of freedom, so the half-width of "
+        f"95 % confidence intervals is about {half_width:.1f} standard errors: {each}"
+    )
+
+
 def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     """Yield remarks on a fit.
 
     The remarks include the message of the fit and the result of the autocorrelation test. If the
+    fit has few degrees of freedom, the remarks include the confidence intervals. If the
     record was fitted with several windows, the remarks include the differences between the windows.
     If there are posterior samples, the remarks include credible intervals.
     """
@@ -248,6 +278,7 @@ def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
         yield f"{law}: standard errors marked by {mark} are not valid: {message}"
     elif message:
         yield f"{law}: {find_status_label_of_fit(fit).replace('_', ' ')}: {message}"
+    yield from _describe_wide_confidence_intervals(fit)
     short = find_parameter_headings(fit)
     spreads = ((short[n], fit[f"{n}_windows"].item()) for n in short if f"{n}_windows" in fit)
     if each := ", ".join(f"{n} {value:.2g}" for n, value in spreads if not math.isnan(value)):
