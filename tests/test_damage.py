@@ -113,8 +113,18 @@ def test_a_number_that_another_program_changed_is_refused_with_the_remedy(writte
         rsfstudy.open(tmp_path / "mine.nc")
     del dataset.attrs["content_digest"]
     dataset.to_netcdf(tmp_path / "mine.nc")
-    with pytest.warns(UserWarning, match="has no digest"):
-        rsfstudy.open(tmp_path / "mine.nc")
+    changed = rsfstudy.open(tmp_path / "mine.nc")
+    assert changed["critical_stiffness"].equals(dataset["critical_stiffness"])
+
+
+def test_a_dataset_of_rsfstudy_that_xarray_saved_opens_without_a_warning(written, tmp_path):
+    """Datasets in memory have no digest, so their files do not have one either."""
+    for number, dataset in enumerate((rsfstudy.open(written), run(STUDY, output=None))):
+        dataset.to_netcdf(path := tmp_path / f"mine{number}.nc")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            opened = rsfstudy.open(path)
+        assert opened["critical_stiffness"].equals(dataset["critical_stiffness"])
 
 
 def test_a_dataset_that_is_written_again_gets_a_digest_of_its_own(written, tmp_path):

@@ -216,6 +216,69 @@ def test_the_y_range_of_a_record_is_the_range_in_the_windows():
     assert "Perrin-Rice-Zheng law" in axes.get_legend_handles_labels()[1]
 
 
+def three_laws(status=(0, 0, 0)):
+    """Return a fit of three laws, the last of which has a second slip distance."""
+    one = fit_of_steps(1).isel(parameter=[0, 1, 2, 3], parameter2=[0, 1, 2, 3])
+    names = ["a", "b", "slip_distance", "slip_distance_2"]
+    dataset = xr.concat([one] * 3, "law", data_vars="minimal", coords="minimal", compat="override")
+    dataset = dataset.assign_coords(law=["slip", "slowness", "two_slip_states"], parameter=names)
+    correlation = dataset["correlation"].values.copy()
+    correlation[:2, 3] = correlation[:2, :, 3] = correlation[2, 1] = correlation[2, :, 1] = np.nan
+    dataset["correlation"] = dataset["correlation"].dims, correlation
+    for name in ("record_displacement", "record_friction", "record_time"):
+        dataset[name] = dataset[name].expand_dims(law=dataset.law).copy()
+    dataset["residual"] = dataset["whitened_residual"] = 1e-3 * dataset["fitted_friction"]
+    dataset["status"] = "law", np.array(status)
+    failed = dataset["status"] == Status.CELL_RAISED
+    values = dataset.drop_vars("status")
+    return values.where(~failed).assign(status=dataset["status"])
+
+
+def test_correlations_of_all_laws_are_drawn():
+    """Parameters that a law does not have are omitted, and the third law has its own panel."""
+    dataset = three_laws()
+    panels = fits.build_fit_panels(dataset)
+    titles = [panel.title(dataset) for panel in panels[3:]]
+    assert titles == [
+        "Correlation: slip below, slowness above",
+        "Correlation: slip law with two states",
+    ]
+    labels = []
+    with plots.style_context():
+        for panel in panels[3:]:
+            panel.overlays[0](dataset, axes := plots.NotebookFigure().add_subplot())
+            labels.append([text.get_text() for text in axes.get_yticklabels()])
+    assert labels == [["$a$", "$b$", "$D_c$"], ["$a$", "$D_c$", "$D_{c2}$"]]
+
+
+def test_a_law_that_is_not_identified_has_no_band():
+    for status, bands in ((Status.NOT_IDENTIFIED, 2), (Status.OK, 3)):
+        axes = plots.NotebookFigure().add_subplot()
+        fits._draw_record_with_fits(three_laws((0, 0, int(status))), axes)
+        assert len(axes.collections) == bands
+        names = axes.get_legend_handles_labels()[1]
+        assert any(name.endswith("if identified") for name in names) is (bands == 2)
+
+
+@pytest.mark.parametrize("failed", [(0,), (0, 1), (2,), (0, 1, 2)])
+def test_a_law_that_failed_does_not_spoil_the_figure(failed):
+    """The record, windows and white noise are drawn with the first law that has values."""
+    dataset = three_laws([int(Status.CELL_RAISED) if n in failed else 0 for n in range(3)])
+    panels = fits.build_fit_panels(dataset)
+    names = []
+    with plots.style_context():
+        for panel in panels:
+            panel.overlays[0](dataset, axes := plots.NotebookFigure().add_subplot())
+            names.append(axes.get_legend_handles_labels()[1])
+    assert len(panels) == 4
+    some = len(failed) < 3
+    assert ("record" in names[0]) is ("fitted window" in names[0]) is some
+    assert any(name.startswith("rows, ") for name in names[1]) is some
+    assert ("white noise (95 %)" in names[2]) is some
+    several = len(failed) == 1
+    assert ("whitened residuals, same colours" in names[2]) is several
+
+
 def test_samples_are_a_corner_plot():
     normal = np.random.default_rng(1).normal
     table = {"a": 0.01 + 1e-3 * normal(size=40), "b_over_a": 2.0 + 0.1 * normal(size=40)}
@@ -232,6 +295,32 @@ def test_samples_are_a_corner_plot():
         assert {other.get_xlim() for other in same_column} == {axes.get_xlim()}
     checks.assert_printable(drawn)
     assert isinstance(corner_plots.build_corner_figure(dataset), corner_plots.CornerFigure)
+
+
+@pytest.mark.parametrize(("count", "omitted"), [(4, ""), (6, ""), (7, "alpha")])
+def test_a_corner_plot_shows_up_to_six_fields_and_names_the_others(count, omitted):
+    uniform = np.random.default_rng(1).uniform
+    ends = {"a": (0.008, 0.012), "b_over_a": (1.4, 1.7), "mu_star": (0.6, 0.7)}
+    ends |= {"load_velocity_ratio": (1.0, 10.0), "phi": (45.0, 85.0)}
+    ends |= {"radiation_damping": (1e-4, 1e-3), "alpha": (0.2, 0.5)}
+    fields = list(ends)[:count]
+    table = {name: uniform(*ends[name], size=40) for name in fields}
+    dataset = lattice(Axis.cases(table, dimension="sample"), Axis("law", ["slip", "slowness"]))
+    drawn = plots.draw_figure(dataset)
+    assert len(drawn.axes) == (min(count, 6) + 1) * (min(count, 6) + 2) // 2
+    notes = [text for axes in drawn.axes for text in axes.texts]
+    assert [note.get_text() for note in notes] == ([f"Not shown: {omitted}"] if omitted else [])
+    drawn.draw_without_rendering()
+    for note in notes:  # The note is in the empty corner above the panels.
+        box = note.get_window_extent()
+        assert drawn.bbox.contains(box.x1, box.y1)
+        assert not any(box.overlaps(axes.get_window_extent()) for axes in drawn.axes)
+        note.remove()
+    # One legend of the laws, and no overlapping tick labels in the narrow panels.
+    assert [axes for axes in drawn.axes if axes.get_legend()] == []
+    (legend,) = drawn.legends
+    assert len(legend.get_texts()) == 2
+    checks.assert_printable(drawn)
 
 
 def test_a_field_of_a_corner_plot_is_drawn_once_with_its_symbol():
@@ -288,6 +377,11 @@ def test_posterior_draws_are_a_corner_plot():
     assert figure.subplot_positions == [0, 2, 3]
     assert figure.panels[1].y_label == r"$D_c$ ($\mu$m)"
     assert np.array_equal(drawn.slip_distance, dataset.posterior[:, 1])
+    dataset["posterior"][:, 1] = np.nan
+    assert corner_plots.build_posterior_corner_figure(dataset)[0].columns == 1
+    dataset["posterior"][:] = np.nan
+    with pytest.raises(InvalidValue, match=r"has no draws in this fit.*message"):
+        corner_plots.build_posterior_corner_figure(dataset)
 
 
 def test_integrators_have_distinct_colours():

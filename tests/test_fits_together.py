@@ -28,11 +28,14 @@ from synthetic_records import (
 import rsfstudy
 from rsfstudy import Axis, Scene
 from rsfstudy.errors import IncompleteWarning, InvalidValue
+from rsfstudy.fitting import Fit, posterior
 from rsfstudy.fitting.joint_window_model import JointWindowModel
 from rsfstudy.fitting.window_model import WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.integrator import Integrator
+from rsfstudy.reporting import TextTable
+from rsfstudy.reporting.fit_summaries import summarise_fits
 from rsfstudy.storage.dataset_files import write_dataset
 
 ENOUGH = 10**9
@@ -54,6 +57,38 @@ def test_two_steps_of_a_record_share_a_law() -> None:
         assert abs(deviation_in_stderrs(both, name, value)) < 4.0, name
     for name in SHARED:
         assert both[f"{name}_stderr"] < alone[f"{name}_stderr"].min(), name
+
+
+def test_tables_of_a_joint_fit_with_a_law_that_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Missing values are dashes in all tables, whichever of the laws failed."""
+
+    def solve_unless_failed(self: Fit, scene: Scene, integrator: Integrator) -> object:
+        if scene.law in failing:
+            raise ValueError("failed")
+        return solve(self, scene, integrator)
+
+    solve = Fit.solve
+    monkeypatch.setattr(Fit, "solve", solve_unless_failed)
+    one = synthetic_record(STEP_UP_AND_BACK, seed=1, count=200)
+    columns = {**one.columns, "normal_stress": np.full(len(one), 20.0)}
+    stressed = rsfstudy.read_record(columns).with_steps(one.loading_steps)
+    for failing in (("slip",), ("slowness",), ("slip", "slowness")):
+        with pytest.warns(IncompleteWarning):
+            fit = rsfstudy.fit(
+                stressed, laws=["slip", "slowness"], together=True, posterior=0, **FIT_OPTIONS
+            )
+        table = next(part for part in summarise_fits(fit) if isinstance(part, TextTable))
+        for row in table.rows[:-1]:
+            for law in ("slip", "slowness"):
+                expected = law in failing
+                if row["parameter"] not in ("k (1/um)", "normal stress (MPa)") or expected:
+                    assert (row[law] == "-") is expected, row
+        assert [row["parameter"] for row in table.rows][-6:-5] == (
+            ["normal stress (MPa)"] if len(failing) < 2 else ["k (1/um)"]
+        )
+        rows = fit.rsf.fit_table().set_index("law")
+        assert (rows.loc[[*failing], "window"] == "").all()
+        assert rows.loc[[*failing], ["a", "k", "V0"]].isna().all(axis=None)
 
 
 def test_one_step_together_is_that_step() -> None:
@@ -261,6 +296,25 @@ def test_the_table_has_the_columns_of_laboratories() -> None:
     assert columns <= set(table.columns)
     assert table.law.tolist() == ["slip", "slowness"]
     assert table.Dc.tolist() == fit.slip_distance.values.ravel().tolist()
+    for column, name in (("a", "a"), ("Dc", "slip_distance")):
+        for end in ("ci_low", "ci_high"):
+            assert table[f"{column}_{end}"].tolist() == fit[f"{name}_{end}"].values.ravel().tolist()
+    assert table.attrs["units"]["Dc_ci_low"] == "um"
+    assert "a_minus_b_ci_low" not in table
+
+
+@pytest.mark.parametrize(("freedom", "half_width"), [(3.0, "3.2"), (5.0, "2.6"), (8.0, "")])
+def test_wide_intervals_are_printed_below_the_table(freedom: float, half_width: str) -> None:
+    """The 97.5 % quantile of Student's t distribution is 3.18, 2.57 and 2.31."""
+    fit = rsfstudy.fit(synthetic_record(seed=4, count=200), laws=["slowness"], **FIT_OPTIONS)
+    fit["degrees_of_freedom"][:] = freedom
+    assert fit.rsf.fit_table().status.item() == "ok"
+    found = [part for part in summarise_fits(fit) if isinstance(part, str) and "half-width" in part]
+    assert len(found) == bool(half_width)
+    for sentence in found:
+        low, high = fit.slip_distance_ci_low.item(), fit.slip_distance_ci_high.item()
+        assert f"about {half_width} standard errors" in sentence
+        assert f"Dc {low:.4g} to {high:.4g}" in sentence
 
 
 def test_a_window_does_not_begin_within_a_hold() -> None:
@@ -407,6 +461,40 @@ def test_a_chain_that_is_too_short_is_refused() -> None:
         fit = rsfstudy.fit(one, posterior=100, budget=enough, **options)
     assert fit.rsf.fit_table().status.item() == "work_budget_spent"
     assert np.isnan(fit.posterior).all()
+    # The values of the fit were computed before the budget was exhausted.
+    assert abs(deviation_in_stderrs(fit.squeeze(), "a", EXACT_PARAMETERS["a"])) < 4.0
+    assert "no posterior draws, because" in fit.message.item()
+
+
+def test_an_error_of_the_sampler_keeps_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_arguments: object) -> None:
+        raise ValueError("walkers are linearly dependent")
+
+    one, options = synthetic_record(seed=4, count=200), {"laws": ["slowness"], **FIT_OPTIONS}
+    without = rsfstudy.fit(one, **options)
+    monkeypatch.setattr(posterior, "sample_posterior_fit_coordinates", fail)
+    fit = rsfstudy.fit(one, posterior=20, **options)
+    assert fit.message.item().endswith(
+        "no posterior draws, because emcee raised ValueError: walkers are linearly dependent"
+    )
+    assert np.isnan(fit.posterior).all()
+    assert np.isnan(fit.autocorrelation_time).all()
+    for name in ("status", "a", "a_ci_low", "residual"):
+        assert fit[name].equals(without[name]), name
+    with pytest.raises(InvalidValue, match="no posterior draws.*walkers are linearly dependent"):
+        fit.rsf.sample_parameters(5, posterior=True)
+
+
+def test_a_fit_without_constraint_is_kept_without_draws() -> None:
+    """The walkers of emcee are linearly dependent because the slip distances are unconstrained."""
+    one, options = synthetic_record(seed=4, count=200), {"laws": ["two_slip_states"], **FIT_OPTIONS}
+    fit = rsfstudy.fit(one, posterior=20, **options)
+    assert fit.rsf.fit_table().status.item() == "not_identified"
+    assert abs(fit.a.item() - EXACT_PARAMETERS["a"]) < 1e-3
+    assert np.isnan(fit.posterior).all()
+    assert re.search(
+        "no posterior draws, because b1.* and .* are not identified", str(fit.message.item())
+    )
 
 
 def test_a_posterior_without_emcee_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

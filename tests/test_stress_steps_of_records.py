@@ -98,6 +98,13 @@ def test_noise_and_drift_are_no_steps(rho: float, drift: float) -> None:
 def test_a_step_of_normal_stress_is_listed_among_those_of_velocity() -> None:
     record = stressed()
     (row,) = record.steps().to_dataframe().to_dict("records")
+    printed = record.step_table()
+    assert printed.index.tolist() == [1]
+    assert printed["normal_stress_before (MPa)"].item() == 1e-6 * row["normal_stress_before"]
+    assert printed["normal_stress_after (MPa)"].item() == 1e-6 * row["normal_stress_after"]
+    assert printed["velocity_before (um/s)"].item() == row["velocity_before"]
+    assert printed["begins (s)"].item() == row["begins"]
+    assert len(printed.columns) == len(row)
     assert (row["begins"], row["ends"]) == pytest.approx((BEGINS, ENDS), abs=0.05)
     assert row["velocity_before"] == row["velocity_after"] == pytest.approx(VELOCITY)
     stresses = row["normal_stress_before"], row["normal_stress_after"]

@@ -522,11 +522,12 @@ class DatasetAccessor:
         Returns
         -------
         pandas.DataFrame
-            Table with one row per fit. The columns are the fitted parameters and their standard
-            errors (``a``, ``a_stderr``, ``b``, ``b_stderr``, ``Dc``, ``Dc_stderr`` and so on), the
-            load point velocities ``V0`` before and ``V1`` after the step, ``law``, ``window``,
-            ``R2``, ``p_value``, ``status`` and others. Lengths are in um and velocities in um/s.
-            The dictionary ``attrs["units"]`` contains the units of each numerical column.
+            Table with one row per fit. The columns are the fitted parameters, their standard errors
+            and the ends of their 95 % confidence intervals (``a``, ``a_stderr``, ``a_ci_low``,
+            ``a_ci_high``, ``b``, ``Dc`` and so on), the load point velocities ``V0`` before and
+            ``V1`` after the step, ``law``, ``window``, ``R2``, ``p_value``, ``status`` and others.
+            Lengths are in um and velocities in um/s. The dictionary ``attrs["units"]`` contains the
+            units of each numerical column.
 
         Raises
         ------

@@ -118,8 +118,12 @@ def _select_posterior_draws(
 ) -> np.ndarray:
     """Select posterior draws at random without replacement."""
     remedy = f"Fit the record with posterior={sample_count}, or pass posterior=False."
-    if "posterior" not in fit or not fit["posterior"].notnull().any():
-        raise InvalidValue("posterior", True, "requires a fit with posterior draws", remedy=remedy)
+    rule = "requires a fit with posterior draws"
+    if "posterior" not in fit:
+        raise InvalidValue("posterior", True, rule, remedy=remedy)
+    if not fit["posterior"].notnull().any():
+        rule += f". The message of this fit is: {fit['message'].item() or 'none'}"
+        raise InvalidValue("posterior", True, rule, remedy="Pass posterior=False.")
     draws = fit["posterior"].transpose("draw", "parameter").values
     if sample_count > len(draws):
         rule = f"is larger than the number of posterior draws, {len(draws)}"

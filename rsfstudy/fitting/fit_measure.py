@@ -414,19 +414,35 @@ class Fit(Measure):
             )
         windows = self._fitted_windows
         search, found = self.solve(scene, integrator)
-        model, place = search.model, windows[0].window_summary_values
-        part = model.window_models[0]
+        part = search.model.window_models[0]
         apart = float(
             np.median(
                 np.diff(part.load_point_displacement[part.time >= windows[0].loading_step.start])
             )
         )
         unidentified = find_unidentified_parameters(found, apart)
+        outcome = self._build_outcome(search, found, unidentified, apart)
+        if self.posterior:
+            return posterior.add_posterior_draws(
+                outcome, search, found, self.posterior, unidentified
+            )
+        return outcome
+
+    def _build_outcome(
+        self,
+        search: FitProblem,
+        found: FitSolution,
+        unidentified: tuple[str, ...],
+        displacement_per_row: float,
+    ) -> Outcome:
+        """Return the outcome of a fit without posterior draws."""
+        windows = self._fitted_windows
+        place = windows[0].window_summary_values
         rows = [
             window.record_row_indices + self._first_output_row_by_record[window.record]
             for window in windows
         ]
-        values = self._collect_output_values(found, np.concatenate(rows), model)
+        values = self._collect_output_values(found, np.concatenate(rows), search.model)
         values |= place
         values["window_stiffness"] = found.parameter_values["stiffness"]
         values["window_stiffness_stderr"] = (
@@ -445,8 +461,6 @@ class Fit(Measure):
         }
         for name, (low, high) in ends.items():
             values[f"{name}_ci_low"], values[f"{name}_ci_high"] = low, high
-        if self.posterior:
-            values |= posterior.sample_posterior_parameters(search, found, self.posterior)
         if unidentified:
             is_least = (
                 "a" in found.free_parameters
@@ -454,7 +468,10 @@ class Fit(Measure):
                 < _DIRECT_EFFECT_BOUND_TOLERANCE_FACTOR * search.compute_parameter_bounds("a")[0]
             )
             text = describe_unidentified_parameters(
-                found, unidentified, apart, direct_effect_is_at_bound=is_least
+                found,
+                unidentified,
+                displacement_per_row,
+                direct_effect_is_at_bound=is_least,
             )
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         remarks = (

@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from scipy.stats import multivariate_t
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
+from rsfstudy.measure_base import Outcome
 from rsfstudy.motion import MotionStopped
 
 if TYPE_CHECKING:
@@ -188,3 +191,51 @@ def sample_posterior_parameters(
     logs = [name in LOGARITHMIC_PARAMETERS for name in fit_solution.free_parameters]
     drawn[:, logs] = np.exp(drawn[:, logs])
     return {"posterior": drawn, "autocorrelation_time": time}
+
+
+def add_posterior_draws(
+    outcome: Outcome,
+    fit_problem: FitProblem,
+    fit_solution: FitSolution,
+    draw_count: int,
+    unidentified_parameters: Sequence[str],
+) -> Outcome:
+    """Add posterior draws to the outcome of a fit.
+
+    If the sampler fails, the outcome keeps the values of the fit, and the message gives the reason
+    why there are no draws.
+
+    Parameters
+    ----------
+    outcome : Outcome
+        Outcome of the fit without draws.
+    fit_problem : FitProblem
+        Least-squares problem that contains the model of the record.
+    fit_solution : FitSolution
+        Solution of the least-squares problem.
+    draw_count : int
+        Number of draws.
+    unidentified_parameters : sequence of str
+        Names of the parameters that the record does not constrain.
+
+    Returns
+    -------
+    Outcome
+        Outcome with the draws. If the work budget is exhausted before the chain is long enough,
+        the status is ``work_budget_spent``. In all other cases, the status does not change.
+    """
+    status, reason, drawn = outcome.status, "the covariance matrix is not finite", {}
+    try:
+        drawn = sample_posterior_parameters(fit_problem, fit_solution, draw_count)
+    except MotionStopped as halt:
+        status, reason = halt.status, str(halt)
+    except Exception as error:  # The errors of emcee have many types.
+        reason = f"emcee raised {type(error).__name__}: {error}"
+    if drawn and math.isfinite(drawn["autocorrelation_time"]):
+        return replace(outcome, values={**outcome.values, **drawn})
+    if unidentified_parameters and status is outcome.status:
+        *first, last = unidentified_parameters
+        verb = "are" if first else "is"
+        reason = f"{' and '.join(filter(None, (', '.join(first), last)))} {verb} not identified"
+    message = "; ".join(filter(None, (outcome.message, f"no posterior draws, because {reason}")))
+    return replace(outcome, status=status, message=message)

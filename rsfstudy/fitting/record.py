@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
@@ -45,6 +46,9 @@ _STEP_TABLE_COLUMNS = (
     Quantity("normal_stress_before", r"$\sigma$", "Pa", "normal stress before the step"),
     Quantity("normal_stress_after", r"$\sigma$", "Pa", "normal stress after the step"),
 )
+#: Units in the headings of the printed table of steps, and factors for the conversion, by the units
+#: of the variable.
+_PRINTED_UNITS_AND_FACTORS = {"s": ("s", 1.0), "um s-1": ("um/s", 1.0), "Pa": ("MPa", 1e-6)}
 
 
 @accept_former_keyword_names
@@ -239,7 +243,12 @@ class Record:
             Dataset with the dimension ``step``, which is numbered from 1, and the variables
             ``begins`` and ``ends`` in s, and ``velocity_before`` and ``velocity_after`` in um/s. If
             the normal stress was recorded, the dataset also contains ``normal_stress_before`` and
-            ``normal_stress_after`` in Pa.
+            ``normal_stress_after`` in Pa. The attribute ``units`` of each variable contains its
+            units.
+
+        See Also
+        --------
+        step_table : The same table as a data frame, with units in the column names.
         """
         numbers = [step[: len(_STEP_TABLE_COLUMNS)] for step in self.loading_steps]
         rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_TABLE_COLUMNS))
@@ -253,6 +262,38 @@ class Record:
         return copy_with_cf_encoding(
             xr.Dataset(data, steps, self._build_dataset_attributes("Detected steps"))
         )
+
+    def step_table(self) -> pd.DataFrame:
+        """Return a data frame of the steps, with units in the column names.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Table with one row per step. The columns are ``begins (s)``, ``ends (s)``,
+            ``velocity_before (um/s)`` and ``velocity_after (um/s)``. If the normal stress was
+            recorded, the table also contains ``normal_stress_before (MPa)`` and
+            ``normal_stress_after (MPa)``.
+
+        See Also
+        --------
+        steps : The same table as a dataset, with normal stress in Pa.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from rsfstudy.fitting import Record
+        >>> time = np.arange(0.0, 100.0, 0.5)
+        >>> displacement = np.where(time < 50.0, time, 50.0 + 10.0 * (time - 50.0))
+        >>> friction = np.full(200, 0.6)
+        >>> record = Record({"time": time, "displacement": displacement, "friction": friction})
+        >>> record.step_table()["velocity_after (um/s)"].round(6).tolist()
+        [10.0]
+        """
+        steps, table = self.steps(), {}
+        for name, values in steps.data_vars.items():
+            units, factor = _PRINTED_UNITS_AND_FACTORS[values.attrs["units"]]
+            table[f"{name} ({units})"] = factor * values.values
+        return pd.DataFrame(table, index=steps.indexes["step"])
 
     def holds(self) -> xr.Dataset:
         """Measure frictional healing and relaxation in all holds of the record.

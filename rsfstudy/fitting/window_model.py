@@ -36,7 +36,7 @@ PARAMETERS = {
         Quantity("b1", "$b_1$", "1", "evolution effect parameter of the first state"),
         Quantity("b2", "$b_2$", "1", "evolution effect parameter of the second state"),
         Quantity("slip_distance", "$D_c$", "um", "characteristic slip distance"),
-        Quantity("slip_distance_2", "$L_2$", "um", "slip distance of the second state"),
+        Quantity("slip_distance_2", "$D_{c2}$", "um", "slip distance of the second state"),
         Quantity("mu_star", r"$\mu_0$", "1", "friction coefficient before the first step"),
         Quantity("stiffness", "$k$", "um-1", "stiffness divided by normal stress"),
         Quantity(

@@ -160,7 +160,8 @@ def draw_figure(
             drawing.align_x_axes_and_hide_inner_labels(drawn)
         else:
             add_panel_letters(drawn)
-        merge_common_legends(figure, drawn)
+        # Only the panels of the primary output in a corner plot have several colours and a legend.
+        merge_common_legends(figure, [a for a in drawn if a.get_legend()] if is_corner else drawn)
         if header:
             _add_header_with_notes(figure, dataset)
         rows = [[a for a in drawn if _find_row_index_of_panel(a) == n] for n in range(len(drawn))]

@@ -8,13 +8,16 @@ the study are shown in different colours.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import xarray as xr
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from rsfstudy.errors import InvalidValue
 from rsfstudy.plots._axis_formatting import (
     describe_point,
     has_numeric_points,
@@ -28,11 +31,18 @@ from rsfstudy.storage import StoredDataset
 from rsfstudy.study import DrawFunction, Figure, Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
-#: Maximum number of quantities in the corner plot, including the measured variable, and maximum
-#: number of ticks per axis.
-_MAX_SCATTERED_QUANTITIES, _MAX_TICKS = 4, 3
+#: Maximum number of sampled fields in the corner plot. The measured variable is not counted.
+_MAX_SCATTERED_FIELDS = 6
 #: Maximum number of parameters in the corner plot of posterior draws.
 _MAX_SCATTERED_PARAMETERS = 6
+#: Maximum number of ticks per axis, and maximum number of columns of panels with this number of
+#: ticks. If there are more columns, the panels are narrow.
+_MAX_TICKS, _MAX_COLUMNS_OF_WIDE_PANELS = 3, 5
+#: Position of the note about omitted quantities, in units of the size of the first panel. The note
+#: is to the right of the panel, where a corner plot is empty.
+_POSITION_OF_NOTE = 1.1, 1.0
+#: Maximum number of characters per line of the note.
+_MAX_NOTE_LINE_CHARACTERS = 60
 #: Maximum number of columns of a figure that is as wide as one column of a journal page.
 _MAX_PANEL_COLUMNS_OF_NARROW_FIGURE = 2
 #: Style of the points in scatter plots. The points are rasterised in vector graphics, because there
@@ -94,6 +104,9 @@ class CornerFigure(Figure):
                 self.subplot_positions.index((self.columns - 1) * self.columns + column)
             ]
             axes.set_xlim(bottom.get_xlim())
+            if row == self.columns - 1 and self.columns > _MAX_COLUMNS_OF_WIDE_PANELS:
+                # The label of a narrow panel is below the power of ten of the tick labels.
+                axes.xaxis.labelpad += 1.2 * float(rcParams["font.size"])
 
 
 def build_corner_figure(dataset: xr.Dataset, variable: str | None = None) -> CornerFigure | None:
@@ -110,8 +123,9 @@ def build_corner_figure(dataset: xr.Dataset, variable: str | None = None) -> Cor
     Returns
     -------
     CornerFigure or None
-        Corner plot. The result is None if the study has no axis with numbered points, such as
-        samples or cases. The result is also None if the variable is not numeric, or does not vary
+        Corner plot of the variable and at most six fields. A note lists the fields that are
+        omitted. The result is None if the study has no axis with numbered points, such as samples
+        or cases. The result is also None if the variable is not numeric, or does not vary
         along an axis with numbered points.
     """
     fields = _list_sampled_fields_by_dimension(dataset)
@@ -125,13 +139,10 @@ def build_corner_figure(dataset: xr.Dataset, variable: str | None = None) -> Cor
         name for name in fields[along] if name not in measured and has_numeric_points(dataset, name)
     ]
     # The last row shows the measured variable against each sampled field.
-    names = sampled[: _MAX_SCATTERED_QUANTITIES - len(measured)] + measured
-    panels = [
-        _build_scatter_or_histogram_panel(dataset, along, x, y)
-        for number, y in enumerate(names, start=1)
-        for x in names[:number]
-    ]
-    return CornerFigure(panels, len(names)) if panels else None
+    names = sampled[:_MAX_SCATTERED_FIELDS] + measured
+    if not names:
+        return None
+    return _build_triangle(dataset, along, names, sampled[_MAX_SCATTERED_FIELDS:])
 
 
 def build_posterior_corner_figure(dataset: xr.Dataset) -> tuple[CornerFigure, xr.Dataset]:
@@ -145,19 +156,58 @@ def build_posterior_corner_figure(dataset: xr.Dataset) -> tuple[CornerFigure, xr
     Returns
     -------
     figure : CornerFigure
-        Corner plot of the first parameters. Fits of several laws or steps have different colours.
+        Corner plot of the first six parameters. A note lists the parameters that are omitted. Fits
+        of several laws or steps have different colours.
     dataset : xarray.Dataset
         Dataset with one variable per parameter, which contains the draws of the parameter.
+
+    Raises
+    ------
+    InvalidValue
+        If the fit has no posterior draws.
     """
-    names = [str(n) for n in dataset["parameter"].values][:_MAX_SCATTERED_PARAMETERS]
+    known = dataset["posterior"].dropna("parameter", how="all")
+    names = [str(n) for n in known["parameter"].values]
+    if not names:
+        remedy = "The variable message of the fit contains the reason."
+        raise InvalidValue("variable", "posterior", "has no draws in this fit", remedy=remedy)
     draws = {n: dataset["posterior"].sel(parameter=n, drop=True) for n in names}
     drawn = dataset.assign({n: draws[n].assign_attrs(dataset[n].attrs) for n in names})
+    shown, omitted = names[:_MAX_SCATTERED_PARAMETERS], names[_MAX_SCATTERED_PARAMETERS:]
+    return _build_triangle(drawn, "draw", shown, omitted), drawn
+
+
+def _build_triangle(
+    dataset: xr.Dataset,
+    sample_dimension: str,
+    variable_names: Sequence[str],
+    omitted_names: Sequence[str],
+) -> CornerFigure:
+    """Build the corner plot of variables, with a note that lists the omitted variables."""
     panels = [
-        _build_scatter_or_histogram_panel(drawn, "draw", x, y)
-        for number, y in enumerate(names, start=1)
-        for x in names[:number]
+        _build_scatter_or_histogram_panel(
+            dataset,
+            sample_dimension,
+            x,
+            y,
+            is_narrow=len(variable_names) > _MAX_COLUMNS_OF_WIDE_PANELS,
+        )
+        for number, y in enumerate(variable_names, start=1)
+        for x in variable_names[:number]
     ]
-    return CornerFigure(panels, len(names)), drawn
+    if omitted_names:
+        note = partial(_write_note_on_omitted_variables, omitted_names)
+        panels[0] = replace(panels[0], overlays=[*panels[0].overlays, note])
+    return CornerFigure(panels, len(variable_names))
+
+
+def _write_note_on_omitted_variables(
+    variable_names: Sequence[str], _dataset: xr.Dataset, axes: Axes
+) -> None:
+    """Write the names of the omitted variables to the right of the first panel."""
+    text = wrap_text(f"Not shown: {', '.join(variable_names)}", _MAX_NOTE_LINE_CHARACTERS)
+    note = axes.text(*_POSITION_OF_NOTE, text, transform=axes.transAxes, va="top")
+    note.set_in_layout(False)  # The layout would otherwise widen the first column.
 
 
 def _list_sampled_fields_by_dimension(dataset: xr.Dataset) -> dict[str, list[str]]:
@@ -170,7 +220,12 @@ def _list_sampled_fields_by_dimension(dataset: xr.Dataset) -> dict[str, list[str
 
 
 def _build_scatter_or_histogram_panel(
-    dataset: xr.Dataset, sample_dimension: str, x_variable: str, y_variable: str
+    dataset: xr.Dataset,
+    sample_dimension: str,
+    x_variable: str,
+    y_variable: str,
+    *,
+    is_narrow: bool,
 ) -> Panel:
     """Build the panel for a pair of quantities.
 
@@ -182,7 +237,8 @@ def _build_scatter_or_histogram_panel(
         for d in dataset[name].dims
         if d != sample_dimension
     )
-    few_ticks = partial(_limit_tick_count, _MAX_TICKS - x_variable.endswith("_error"))
+    has_long_labels = is_narrow or x_variable.endswith("_error")
+    few_ticks = partial(_limit_tick_count, _MAX_TICKS - has_long_labels)
     if x_variable == y_variable:
         marks: list[DrawFunction] = [partial(draw_histogram, x_variable, list(by)), few_ticks]
         return Panel(
@@ -222,7 +278,8 @@ def _format_short_axis_label(dataset: xr.Dataset, variable_name: str) -> str:
 def _limit_tick_count(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -> None:
     """Limit the number of ticks so that the tick labels do not overlap.
 
-    Error estimates have long tick labels, so the x axis has fewer ticks for error estimates.
+    Error estimates have long tick labels, so the x axis has fewer ticks for error estimates. The x
+    axis also has fewer ticks if the panels are narrow.
     """
     axes.xaxis.set_major_locator(MaxNLocator(max_x_tick_count))
     axes.yaxis.set_major_locator(MaxNLocator(_MAX_TICKS))

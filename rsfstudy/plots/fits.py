@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from rsfstudy.fitting import PARAMETERS, split_window_number
 from rsfstudy.plots._axis_formatting import MIN_FONT_SIZE, describe_point
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_style
+from rsfstudy.status import Status
 from rsfstudy.study import Panel
 
 #: Maximum lag of the autocorrelation, minimum number of rows that remain after a long record is
@@ -63,8 +64,8 @@ def build_fit_panels(dataset: xr.Dataset) -> Sequence[Panel]:
     Returns
     -------
     tuple of Panel
-        One panel per record, for at most four records, followed by three panels for the first
-        record.
+        One panel per record, for at most four records, followed by panels for the first record:
+        residuals, autocorrelation, and one panel of correlations for each pair of laws.
     """
     records = dataset.sizes.get("record", 1)
     part, record = ([d] if d in dataset.dims else [] for d in ("part", "record"))
@@ -79,6 +80,7 @@ def build_fit_panels(dataset: xr.Dataset) -> Sequence[Panel]:
         for number in range(min(records, _MAX_RECORD_PANELS))
     ]
     first = replace(named, isel=of_record[0].isel)
+    pairs = _pair_laws_with_correlations(dataset.isel(first.isel))
     return (
         *of_record,
         replace(first, overlays=[_draw_residuals], y_label="Residual friction"),
@@ -89,10 +91,13 @@ def build_fit_panels(dataset: xr.Dataset) -> Sequence[Panel]:
             x_label="Lag (rows)",
             y_label="Autocorrelation of residuals",
         ),
-        Panel(
-            isel=first.isel,
-            overlays=[_draw_parameter_correlation_matrix],
-            title=_format_correlation_title,
+        *(
+            Panel(
+                isel=first.isel,
+                overlays=[partial(_draw_parameter_correlation_matrix, law_numbers=pair)],
+                title=partial(_format_correlation_title, law_numbers=pair),
+            )
+            for pair in pairs
         ),
     )
 
@@ -163,27 +168,36 @@ def _iterate_columns_of_fit_windows(
 
 
 def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw a record with the fitted curves and their confidence bands."""
-    windows = []
-    for number, (one, name, law) in enumerate(_iterate_fits_and_law_descriptions(dataset)):
-        if not number:
+    """Draw a record with the fitted curves and their confidence bands.
+
+    If the record does not constrain a parameter, the confidence band would cover the panel, and is
+    therefore not drawn.
+    """
+    windows: list[float] = []
+    all_have_bands = True
+    record = [np.zeros(0)]
+    first_law = -1
+    for one, name, law in _iterate_fits_and_law_descriptions(dataset):
+        if not record[0].size:
             record = _extract_thinned_columns_of_fit(
                 one, ("record_displacement", "record_friction")
             )
+            if not record[0].size:
+                continue  # A fit that failed has no rows.
             axes.plot(*record, label="record", **_LINE_STYLE_OF_RECORD_ROWS)
+            first_law = law
+        has_band = _is_identified(one)
+        all_have_bands = all_have_bands and has_band
         names = "record_displacement", "fitted_friction", "fitted_friction_stderr"
         style = cycle_style(law) | {"marker": "", "label": name, "linewidth": 1.2, "zorder": 3}
         for x, y, error in _iterate_columns_of_fit_windows(one, names):
-            if not law:
+            if law == first_law:
                 axes.axvspan(x[0], x[-1], color="0.94", lw=0, zorder=0, label="fitted window")
             windows += [x[0], x[-1]]
-            band = {"color": style["color"], "alpha": 0.3, "lw": 0, "zorder": 2}
-            axes.fill_between(
-                x,
-                y - _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS * error,
-                y + _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS * error,
-                **band,
-            )
+            if has_band:
+                band = {"color": style["color"], "alpha": 0.3, "lw": 0, "zorder": 2}
+                half = _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS * error
+                axes.fill_between(x, y - half, y + half, **band)
             axes.plot(x, y, **style)
     if windows:
         beside = _MARGIN_FRACTION_BESIDE_WINDOWS * (max(windows) - min(windows))
@@ -196,7 +210,14 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
         _set_y_limits_to_visible_lines(axes)
     # The bands have the colours of the laws, so the legend entry is grey.
     said = rf"$\pm${_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS:g} standard errors"
+    if not all_have_bands:
+        said += ", if identified"
     add_grey_legend_entry(axes, said, {"linewidth": 5.0, "alpha": 0.3})
+
+
+def _is_identified(fit: xr.Dataset) -> bool:
+    """Return True unless the record does not constrain a parameter of a fit."""
+    return "status" not in fit or int(fit["status"]) != Status.NOT_IDENTIFIED
 
 
 def _set_y_limits_to_visible_lines(axes: Axes) -> None:
@@ -218,12 +239,14 @@ def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
     overlap is drawn in a pale colour.
     """
     previous_end, end, overlap = dict[int, float](), dict[int, float](), False
+    first_law = None
     axes.axhline(0.0, color="0.5", lw=0.8, zorder=2)
     for one, name, law in _iterate_fits_and_law_descriptions(dataset):
         style = cycle_style(law) | {"label": name, "marker": "", "linewidth": 1.0, "zorder": 3}
         previous_end[law] = end.get(law, -math.inf)
         for x, y in _iterate_columns_of_fit_windows(one, ("record_displacement", "residual")):
-            if not law:
+            first_law = law if first_law is None else first_law
+            if law == first_law:
                 axes.plot(x, y, label=f"rows, {name}", **_LINE_STYLE_OF_RECORD_ROWS)
             count = max(1, round(_RESIDUAL_AVERAGING_FRACTION_OF_WINDOW * len(x)))
             mean = np.ones(count) / count
@@ -241,6 +264,7 @@ def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
 def _draw_autocorrelation_of_residuals(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the autocorrelation of residuals and of whitened residuals."""
     axes.axhline(0.0, color="0.5", lw=0.8)
+    curve_count = 0
     for one, name, law in _iterate_fits_and_law_descriptions(dataset, only_first_step=True):
         left, whitened = _extract_thinned_columns_of_fit(one, ("residual", "whitened_residual"))
         if len(left) <= _MAX_AUTOCORRELATION_LAGS:
@@ -249,9 +273,11 @@ def _draw_autocorrelation_of_residuals(dataset: xr.Dataset, axes: Axes) -> None:
         axes.plot(_compute_autocorrelation(left), **style | {"label": name})
         axes.plot(_compute_autocorrelation(whitened), **style | {"linestyle": ":"})
         bound = 2.0 / len(left) ** 0.5
-        if not law:
+        if not curve_count:
             axes.axhspan(-bound, bound, color="0.9", lw=0, zorder=0, label="white noise (95 %)")
-    add_grey_legend_entry(axes, "whitened residuals", {"linestyle": ":"})
+        curve_count += 1
+    text = "whitened residuals" + ", same colours" * (curve_count > 1)
+    add_grey_legend_entry(axes, text, {"linestyle": ":"})
 
 
 def _compute_autocorrelation(residuals: np.ndarray) -> np.ndarray:
@@ -263,10 +289,24 @@ def _compute_autocorrelation(residuals: np.ndarray) -> np.ndarray:
     )
 
 
-def _format_correlation_title(dataset: xr.Dataset) -> str:
+def _pair_laws_with_correlations(dataset: xr.Dataset) -> list[tuple[int, ...]]:
+    """Return the indices of the friction laws in each panel of correlations.
+
+    Each panel shows two laws, or one law if the number of laws is odd. Laws without correlations in
+    the first step are omitted.
+    """
+    known = [
+        law
+        for one, _name, law in _iterate_fits_and_law_descriptions(dataset, only_first_step=True)
+        if one["correlation"].notnull().any()
+    ]
+    return [tuple(known[n : n + 2]) for n in range(0, len(known), 2)] or [(0,)]
+
+
+def _format_correlation_title(dataset: xr.Dataset, law_numbers: Sequence[int] = (0,)) -> str:
     """Return the title of the correlation panel with the first step and friction law names."""
     step = f", step {dataset['step'].values[0]:g}" if "step" in dataset.dims else ""
-    laws = [describe_point(dataset.isel(law=n), "law") for n in range(dataset.sizes["law"])][:2]
+    laws = [describe_point(dataset.isel(law=n), "law") for n in law_numbers]
     if len(laws) == 1:
         return f"Correlation{step}: {laws[0]}"
     first, second = (law.removesuffix(" law") for law in laws)
@@ -280,19 +320,21 @@ def _format_parameter_symbol(parameter_name: str) -> str:
     return f"{symbol[:-1]}^{{({number})}}$" if number else symbol
 
 
-def _draw_parameter_correlation_matrix(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the correlation matrix of the parameters.
+def _draw_parameter_correlation_matrix(
+    dataset: xr.Dataset, axes: Axes, law_numbers: Sequence[int] = (0,)
+) -> None:
+    """Draw the correlation matrix of the parameters of one or two friction laws.
 
     The lower triangle of the matrix shows the fit of the first friction law, and the upper triangle
-    shows the fit of the second friction law.
+    shows the fit of the second friction law. Parameters without correlations in both fits are
+    omitted.
     """
-    fits = [
-        one
-        for one, _name, _law in _iterate_fits_and_law_descriptions(dataset, only_first_step=True)
-    ][:2]
-    lower, upper = fits[0]["correlation"].values, fits[-1]["correlation"].values
-    values = np.tril(lower) + np.triu(upper, 1)
-    names = [_format_parameter_symbol(str(name)) for name in dataset["parameter"].values]
+    fits = [one for one, *_ in _iterate_fits_and_law_descriptions(dataset, only_first_step=True)]
+    lower, upper = (fits[law_numbers[n]]["correlation"].values for n in (0, -1))
+    known = (np.isfinite(lower) | np.isfinite(upper)).any(axis=0)
+    known |= not known.any()
+    values = (np.tril(lower) + np.triu(upper, 1))[np.ix_(known, known)]
+    names = [_format_parameter_symbol(str(name)) for name in dataset["parameter"].values[known]]
     colours = colormaps["RdBu_r"].with_extremes(bad="0.85")
     image = axes.imshow(values, vmin=-1.0, vmax=1.0, cmap=colours, aspect="auto")
     axes.grid(visible=False)

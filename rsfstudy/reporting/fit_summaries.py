@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.stats import t as student_t
 
 from rsfstudy.fitting import PARAMETERS, describe_whiteness, split_window_number
 from rsfstudy.reporting.fit_tables import (
@@ -18,7 +19,7 @@ from rsfstudy.reporting.fit_tables import (
     find_stderr_of_fixed_stiffness,
     split_into_single_fits,
 )
-from rsfstudy.reporting.text_tables import TextTable
+from rsfstudy.reporting.text_tables import TextTable, format_number_or_dash
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 
@@ -32,6 +33,9 @@ _MAX_PRINTED_RELATIVE_ERROR = 1e4
 #: If the AIC values of two friction laws differ by more than this limit, the comparison of the laws
 #: is decisive.
 _DECISIVE_AIC_DIFFERENCE = 10.0
+#: Smallest half-width of the confidence intervals, in standard errors, at which a remark lists the
+#: confidence intervals.
+_MIN_REPORTED_HALF_WIDTH_IN_STDERRS = 2.5
 #: Symbol that marks invalid standard errors.
 _MARK_OF_INVALID_STDERRS = "*"
 
@@ -117,8 +121,11 @@ def _build_summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
 def _build_parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
     """Return a table of the parameters with one column per fit."""
     columns = {str(one["law"].item()): _build_parameter_column(one) for one in fits}
-    headings = next(iter(columns.values()))
-    rows = [{"parameter": h, **{law: c[h] for law, c in columns.items()}} for h in headings]
+    # A law that could not be fitted has no normal stress, so its column is shorter.
+    headings = max(columns.values(), key=len)
+    rows = [
+        {"parameter": h, **{law: c.get(h, "-") for law, c in columns.items()}} for h in headings
+    ]
     windows = (_describe_fit_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
     return TextTable(rows, "\n".join(filter(None, (table_title, next(windows, "")))))
 
@@ -133,7 +140,11 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
     }
     if "window_stiffness" in fit and "stiffness" not in fit["parameter"].values:
         value, stderr = fit["window_stiffness"].item(), find_stderr_of_fixed_stiffness(fit)
-        text = format_value_with_stderr(value, stderr) if stderr else f"{value:.6g}"
+        text = (
+            format_value_with_stderr(value, stderr)
+            if stderr
+            else format_number_or_dash(value, ".6g")
+        )
         found["k" + _format_units_in_brackets("stiffness")] = text
     stresses = [f"{stress:.6g}" for stress in find_normal_stresses_in_mpa(fit).values()]
     if stresses:
@@ -228,10 +239,36 @@ def format_value_with_stderr(value: float, stderr: float) -> str:
     return f"({value / scale:z.{digits}f} +- {stderr / scale:.{digits}f})e{size:+03d}"
 
 
+def _describe_wide_confidence_intervals(fit: xr.Dataset) -> Iterator[str]:
+    """Yield a sentence with the confidence intervals if the fit has few degrees of freedom.
+
+    The intervals are then much wider than two standard errors. Fits with unconstrained parameters
+    or invalid standard errors are omitted.
+    """
+    freedom = fit["degrees_of_freedom"].item() if "degrees_of_freedom" in fit else math.nan
+    half_width = float(student_t.ppf(0.975, freedom)) if freedom > 0.0 else math.nan
+    if (
+        find_status_label_of_fit(fit) != Status.OK.label
+        or not half_width >= _MIN_REPORTED_HALF_WIDTH_IN_STDERRS
+    ):
+        return
+    ends = (
+        (heading, fit[f"{name}_ci_low"].item(), fit[f"{name}_ci_high"].item())
+        for name, heading in find_parameter_headings(fit).items()
+        if f"{name}_ci_low" in fit
+    )
+    each = ", ".join(f"{n} {low:.4g} to {high:.4g}" for n, low, high in ends if math.isfinite(low))
+    yield (
+        f"{fit['law'].item()}: the fit has {freedom:.2g} degrees of freedom, so the half-width of "
+        f"95 % confidence intervals is about {half_width:.1f} standard errors: {each}"
+    )
+
+
 def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     """Yield remarks on a fit.
 
     The remarks include the message of the fit and the result of the autocorrelation test. If the
+    fit has few degrees of freedom, the remarks include the confidence intervals. If the
     record was fitted with several windows, the remarks include the differences between the windows.
     If there are posterior samples, the remarks include credible intervals.
     """
@@ -241,15 +278,16 @@ def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
         yield f"{law}: standard errors marked by {mark} are not valid: {message}"
     elif message:
         yield f"{law}: {find_status_label_of_fit(fit).replace('_', ' ')}: {message}"
+    yield from _describe_wide_confidence_intervals(fit)
     short = find_parameter_headings(fit)
     spreads = ((short[n], fit[f"{n}_windows"].item()) for n in short if f"{n}_windows" in fit)
     if each := ", ".join(f"{n} {value:.2g}" for n, value in spreads if not math.isnan(value)):
         yield f"{law}: range of the parameters over the windows: {each}"
     if "posterior" in fit and math.isfinite(fit["autocorrelation_time"].item()):
-        drawn = fit["posterior"].quantile([0.025, 0.975], "draw")
+        drawn = fit["posterior"].dropna("parameter", how="all").quantile([0.025, 0.975], "draw")
         each = ", ".join(
             f"{short[str(of.parameter.values)]} {of.values[0]:.4g} to {of.values[1]:.4g}"
-            for of in drawn.dropna("parameter").transpose("parameter", ...)
+            for of in drawn.transpose("parameter", ...)
         )
         time = f"{fit['autocorrelation_time'].item():.2g} steps"
         yield f"{law}: 95 % credible intervals: {each} (autocorrelation time {time})"

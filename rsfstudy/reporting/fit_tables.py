@@ -172,6 +172,9 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
 
         - Columns ``<name>_stderr`` contain standard errors. The standard errors of a row with the
           status ``errors_not_valid`` are not valid.
+        - Columns ``<name>_ci_low`` and ``<name>_ci_high`` contain the ends of the 95 % confidence
+          intervals. With few degrees of freedom, the intervals are much wider than two standard
+          errors. The column ``a_minus_b`` has no confidence interval.
         - Columns ``<name>_windows`` contain the range of a parameter over the windows.
         - ``k`` is the stiffness divided by the normal stress in 1/um.
         - ``normal_stress`` is the mean normal stress before the step in MPa.
@@ -187,7 +190,7 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     for one in split_into_single_fits(dataset):
         row: dict[str, Any] = dict(find_record_and_step_of_fit(one))
         for name, short in find_parameter_headings(one).items():
-            for suffix in ("", "_stderr", "_windows"):
+            for suffix in ("", "_stderr", "_ci_low", "_ci_high", "_windows"):
                 if f"{name}{suffix}" in one:
                     row[f"{short}{suffix}"] = one[f"{name}{suffix}"].item()
                     units[f"{short}{suffix}"] = read_units_or_reference_scale(one[name].attrs)
@@ -207,7 +210,8 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
             units |= dict.fromkeys(
                 ("k", "k_stderr"), read_units_or_reference_scale(one["window_stiffness"].attrs)
             )
-        row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
+        ends = [one[f"window_{end}"].item() for end in ("begins", "ends")]
+        row["window"] = " to ".join(f"{x:g}" for x in ends if math.isfinite(x))
         row["R2"], row["aic"] = one["r_squared"].item(), one["aic"].item()
         row["p_value"], row["status"] = one["p_value"].item(), find_status_label_of_fit(one)
         rows.append(row)

@@ -244,7 +244,9 @@ def read_dataset(path: Path) -> xr.Dataset:
     Warns
     -----
     RsfStudyWarning
-        If the results have no digest, because another program saved the file.
+        If the file has the digest of its contents, but no digest of all bytes, because another
+        program read the file and saved it again. Datasets in memory have no digest, so no warning
+        is issued if a dataset from rsfstudy was saved with ``to_netcdf``.
     """
     where = shorten_text(path)
     try:
@@ -258,7 +260,8 @@ def read_dataset(path: Path) -> xr.Dataset:
             dataset = xr.load_dataset(path, engine="netcdf4")
             if not sealed:
                 content_digest.check_content_digest(dataset, where)
-            dataset.attrs.pop(content_digest.CONTENT_DIGEST_ATTRIBUTE, None)
+        was_saved_again = not sealed and content_digest.CONTENT_DIGEST_ATTRIBUTE in dataset.attrs
+        dataset.attrs.pop(content_digest.CONTENT_DIGEST_ATTRIBUTE, None)
     except RsfStudyError:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise errors of many types.
@@ -272,7 +275,7 @@ def read_dataset(path: Path) -> xr.Dataset:
         schema.check_results_dataset(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
-    if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
+    if was_saved_again:
         said = (
             f"{where} has no digest, because another program saved the file and may have changed it"
         )
