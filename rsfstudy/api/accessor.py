@@ -460,7 +460,7 @@ class DatasetAccessor:
 
         See Also
         --------
-        to_dataframe : Convert the dataset to a table without constant columns.
+        to_dataframe : Convert the dataset to a table without constant coordinates.
 
         Examples
         --------
@@ -476,7 +476,7 @@ class DatasetAccessor:
 
     @raise_only_rsfstudy_errors
     def to_dataframe(self, *, decoded: bool = False) -> pd.DataFrame:
-        """Convert the dataset to a table, and omit constant columns.
+        """Convert the dataset to a table, and omit constant coordinates.
 
         Parameters
         ----------
@@ -490,9 +490,11 @@ class DatasetAccessor:
         pandas.DataFrame
             Table with one row per cell of a study, or with one row per time of a motion. Variables
             with additional dimensions inside a cell, such as orbits, are omitted. For other
-            datasets of one scene, the table has a single row. The dictionary ``attrs["constant"]``
-            of the table contains the values of the omitted columns. The dictionary
-            ``attrs["units"]`` contains the units of each numerical column. The units of a
+            datasets of one scene, the table has a single row. The status and all results are
+            columns, even if their values are equal in all rows. The dictionary
+            ``attrs["constant"]`` of the table contains the values of the omitted coordinates and of
+            variables without dimensions. The dictionary ``attrs["units"]`` contains the units of
+            each numerical column and of each number in ``attrs["constant"]``. The units of a
             normalised variable are its scale, such as ``D_c/V_*``.
 
         Raises
