@@ -64,7 +64,10 @@ class Status(IntEnum):
     NOT_APPLICABLE = 14, "the result is not defined for this scene"
     ACCURACY_OUT_OF_REACH = (
         15,
-        ("the integrator did not reach the requested accuracy within the permitted work"),
+        (
+            "the search or the integrator cannot reach the requested accuracy, and a larger budget "
+            "would not help"
+        ),
     )
     SLIP_STOPPED = 16, "the slider is not loaded, and its slip rate falls below 10^-290 V_*"
     NOT_PERIODIC = (
@@ -78,7 +81,10 @@ class Status(IntEnum):
     # The statuses below are failures.
     WORK_BUDGET_SPENT = (
         20,
-        "the evaluation budget or a limit of the measure was exceeded before a result was found",
+        (
+            "the evaluation budget or a limit of the measure was exceeded before a result was "
+            "found, and a larger budget or limit may help"
+        ),
     )
     INTEGRATION_FAILED = 21, "the integration failed, or a value is not finite"
     UNVERIFIED = (
