@@ -17,6 +17,19 @@ from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
 
 __getattr__ = build_getattr_for_former_names(__name__)
 
+#: Attribute ``comment`` of the results of a study. The text is true for dimensionless results, for
+#: axes in the units of a rig, and for fits.
+COMMENT_ON_UNITS_AND_SCALES = (
+    "Variables have the units in their attributes. Variables with the attribute scale are "
+    "dimensionless, and the attribute contains their scale: sigma_* for stress, D_c for slip, "
+    "D_c/V_* for time, V_* for slip rate."
+)
+#: Beginnings of the comment in results files. Older files contain the second text.
+_BEGINNINGS_OF_COMMENT_ON_SCALES = (
+    COMMENT_ON_UNITS_AND_SCALES,
+    "Quantities are dimensionless: stress in sigma_*",
+)
+
 #: Pattern of a column heading with a name and units.
 _HEADING_WITH_UNITS_PATTERN = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 
@@ -451,3 +464,25 @@ def _format_html_table_cell(value: Any) -> str:
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{value:.6g}"
     return HtmlMarkup.escape(value)
+
+
+def replace_comment_on_scales(attributes: Mapping[Any, Any], replacement: str) -> dict[Any, Any]:
+    """Replace the comment on the attribute ``scale`` after this attribute was removed.
+
+    Parameters
+    ----------
+    attributes : mapping of str to object
+        Attributes of a dataset.
+    replacement : str
+        New comment.
+
+    Returns
+    -------
+    dict of str to object
+        Attributes with the new comment. A comment on a different subject is not replaced.
+    """
+    comment = str(attributes.get("comment", ""))
+    replaced = (
+        {"comment": replacement} if comment.startswith(_BEGINNINGS_OF_COMMENT_ON_SCALES) else {}
+    )
+    return {**attributes, **replaced}

@@ -65,8 +65,8 @@ class Status(IntEnum):
     ACCURACY_OUT_OF_REACH = (
         15,
         (
-            "the integrator did not reach the requested accuracy within the permitted work, or "
-            "the search of a fit did not converge"
+            "the integrator cannot reach the requested accuracy, and a larger budget would not help, "
+            "or the search of a fit did not converge"
         ),
     )
     SLIP_STOPPED = 16, "the slider is not loaded, and its slip rate falls below 10^-290 V_*"
@@ -81,7 +81,10 @@ class Status(IntEnum):
     # The statuses below are failures.
     WORK_BUDGET_SPENT = (
         20,
-        "the evaluation budget or a limit of the measure was exceeded before a result was found",
+        (
+            "the evaluation budget or a limit of the measure was exceeded before a result was "
+            "found, and a larger budget or limit may help"
+        ),
     )
     INTEGRATION_FAILED = 21, "the integration failed, or a value is not finite"
     UNVERIFIED = (

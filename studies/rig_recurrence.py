@@ -16,6 +16,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Rig, Study
 from rsfstudy.measures import LimitCycle
 from rsfstudy.reductions import LinearFit
+from rsfstudy.study.figure_declarations import MatplotlibAxes
 
 #: Normal stresses in MPa.
 NORMAL_STRESSES = (5.0, 10.0, 20.0)
@@ -116,6 +117,20 @@ def loading_time_line(row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     return row["load_velocity"], row["static_stress_drop"] / stress_rate
 
 
+def explain_lines(_results: xr.Dataset, axes: MatplotlibAxes) -> None:
+    """Write the meaning of the lines into a panel.
+
+    Parameters
+    ----------
+    _results : xarray.Dataset
+        Results of the panel, which are not used.
+    axes : matplotlib.axes.Axes
+        Axes of the panel.
+    """
+    text = "lines: stress drop /\n(stiffness $\\times$ load point velocity)"
+    axes.text(0.04, 0.05, text, transform=axes.transAxes, va="bottom", fontsize="small")
+
+
 panel = Panel(x="load_velocity", hue=["sigma_star"], facet=["law"])
 figure = Figure(
     [
@@ -124,6 +139,7 @@ figure = Figure(
             y="recurrence_interval",
             log="xy",
             fit_line=loading_time_line,
+            overlays=[explain_lines],
             y_scale_group="interval",
             y_label="Recurrence interval (s)",
         ),

@@ -14,6 +14,8 @@ import rsfstudy.api.accessor  # Register the accessor.
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
+from rsfstudy.reporting import build_failed_cells_table
+from rsfstudy.status import Status
 
 STUDY = Study(
     name="soft_and_stiff",
@@ -74,7 +76,8 @@ def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     with pytest.warns(NoResultWarning):
         step = rsfstudy.critical_step(scene, rtol=1e-3)
     assert step.rsf.scene == scene
-    (row,) = step.rsf.failures().to_dict("records")
+    assert step.rsf.failures().empty
+    (row,) = step.rsf.failures(include_answers=True).to_dict("records")
     assert row["status"] == "unstable_at_any_step"
     for ask in (lambda: step.rsf.study, step.rsf.check):
         with pytest.raises(DataError, match="belongs to a single scene"):
@@ -104,14 +107,23 @@ def test_results_know_their_study_and_each_cell_its_scene(results):
         _ = elsewhere.rsf.scene
 
 
-def test_failures_name_the_cells_without_a_number(results):
-    failures = results.rsf.failures()
+def test_failures_are_the_cells_that_the_warning_counts(results):
+    failures = results.rsf.failures(include_answers=True)
     assert list(failures.columns) == ["law", "stiffness_ratio", "status", "message"]
     assert failures.law.tolist() == ["slip", "slowness"]
     assert failures.stiffness_ratio.tolist() == [0.8, 0.8]
     assert set(failures.status) == {"unstable_at_any_step"}
-    assert len(results.isel(law=0, stiffness_ratio=0).rsf.failures()) == 1
-    assert results.isel(law=0, stiffness_ratio=1).rsf.failures().empty
+    one = results.isel(law=0, stiffness_ratio=0)
+    assert len(one.rsf.failures(include_answers=True)) == 1
+    assert results.isel(law=0, stiffness_ratio=1).rsf.failures(include_answers=True).empty
+    assert results.rsf.failures().empty
+    mixed = results.copy(deep=True)
+    mixed["status"][:, 1] = [int(Status.WORK_BUDGET_SPENT), int(Status.PENDING)]
+    (row,) = mixed.rsf.failures().to_dict("records")
+    assert (row["law"], row["status"]) == ("slip", "work_budget_spent")
+    assert len(mixed.rsf.failures(include_answers=True)) == 4
+    (listed,) = build_failed_cells_table(mixed, "it.nc").unformatted_rows
+    assert listed["coordinates"] == {"law": "slip", "stiffness_ratio": 1.2}
 
 
 def test_only_whole_results_are_drawn_and_checked_in_their_own_units(results):
@@ -144,7 +156,7 @@ def test_a_file_that_xarray_opens_has_it_and_the_import_alone_loads_nothing(file
         "import sys, rsfstudy\n"
         "assert 'xarray' not in sys.modules\n"
         "import xarray\n"
-        f"print(len(xarray.open_dataset({str(file)!r}).rsf.failures()))\n"
+        f"print(len(xarray.open_dataset({str(file)!r}).rsf.failures(include_answers=True)))\n"
         "assert not {'distributed', 'matplotlib'} & set(sys.modules)"
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=False)

@@ -56,7 +56,7 @@ WRONG = {
         ("raises", "cell_raised", "ZeroDivisionError: in the cell"),
         ("runs out of memory", "cell_raised", "MemoryError"),
         ("recurses", "cell_raised", "RecursionError"),
-        ("spends", "work_budget_spent", "--budget 2000000 (in Python, Accuracy(budget=2000000))"),
+        ("spends", "work_budget_spent", "--budget 2000000 (in Python, budget=2000000)"),
         ("nan", "not_finite", "total = nan"),
         ("no outcome", "cell_raised", "must be an Outcome with a Status"),
         ("undeclared", "cell_raised", "'totla' is not declared. Did you mean 'total'?"),

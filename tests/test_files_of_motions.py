@@ -153,8 +153,30 @@ def test_a_table_of_a_study_has_a_row_a_cell():
     table = results.rsf.to_dataframe()
     assert table["stiffness_ratio"].tolist() == [0.5, 0.6, 0.7]
     assert "load_velocity_ratio" not in table
-    assert "status" not in table  # All statuses are OK.
+    assert table["status"].tolist() == [0, 0, 0]
     np.testing.assert_array_equal(table["static_stress_drop"], results["static_stress_drop"])
+
+
+def test_the_columns_of_a_table_do_not_depend_on_the_results():
+    """A study without any limit cycle has the same columns as a study with limit cycles."""
+    tables = []
+    for ratios in ([0.5, 0.6], [2.0, 3.0]):
+        study = study_of(
+            "two",
+            LimitCycle(phases=2),
+            rsfstudy.Axis("stiffness_ratio", ratios),
+            base=SCENE,
+        )
+        results = rsfstudy.run(
+            study, workers=0, output=None, progress=False, engine="compiled", rtol=1e-3
+        )
+        tables.append(results.rsf.to_dataframe(decoded=True))
+    cycles, steady = tables
+    assert list(cycles) == list(steady)
+    assert steady["status"].tolist() == ["no_limit_cycle"] * 2
+    assert steady["recurrence_interval"].isna().all()
+    assert {"normal_stress", "reference_rate"} <= set(steady.attrs["constant"])
+    assert steady.attrs["units"]["reference_rate"] == "s-1"
 
 
 def test_a_decoded_table_equals_the_table_that_is_exported(tmp_path):
@@ -170,6 +192,7 @@ def test_a_decoded_table_equals_the_table_that_is_exported(tmp_path):
     units = table.attrs["units"]
     assert units["recurrence_interval"] == "D_c/V_*"
     assert not {"status", "slip_mode"} & set(units)
+    assert units["instability_norm"] == "1"
     assert results.rsf.to_dataframe()["status"].tolist() == [0, 3]
     export_files.to_csv(results, tmp_path / "it.csv")
     exported = pd.read_csv(tmp_path / "it.csv")

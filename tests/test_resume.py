@@ -353,7 +353,7 @@ def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again
     few = {"b_over_a": [2.0], "output": tmp_path}
     spent = run_with_failures(SMALL_STUDY, budget=300, **few)
     assert (spent.status == int(Status.WORK_BUDGET_SPENT)).all()
-    assert "--budget 1200 (in Python, Accuracy(budget=1200))" in spent.message.values.flat[0]
+    assert "--budget 1200 (in Python, budget=1200)" in spent.message.values.flat[0]
     answered = run(SMALL_STUDY, budget=100_000, **few)
     assert (answered.status == int(Status.OK)).all()
     again = run(SMALL_STUDY, budget=200_000, **few)

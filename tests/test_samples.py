@@ -4,6 +4,7 @@ The tests also cover statistics of the results.
 """
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -384,6 +385,24 @@ def test_sobol_indices_of_a_function_that_has_them_in_closed_form():
         assert float((high - low).max()) < 0.3
         np.testing.assert_allclose(found[f"share_{order}"], values, atol=0.05)
     assert found["input"].values.tolist() == ["x0", "x1", "x2"]
+    assert "note" not in found["share_total"].attrs
+    few = saltelli(lambda x, y, z: np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x), 16)
+    found = apply_reductions(few, (SobolIndices("share", "y", over="draw"),))
+    for result in (found["share_first_order"], found["share_total"]):
+        assert re.match(
+            r"share: the Sobol indices are not accurate, because a 95 % confidence interval is "
+            r"[\d.]+ wide",
+            result.attrs["note"],
+        )
+
+
+def test_a_first_order_index_above_the_total_index_is_noted():
+    """A first-order index never exceeds the total index of the same quantity."""
+    indices = np.array([[[0.6, 0.5, 0.7], [0.3, 0.2, 0.4]], [[0.3, 0.2, 0.4], [0.3, 0.2, 0.4]]])
+    note = SobolIndices("share", "y")._describe_inaccurate_indices(
+        np.moveaxis(indices, 0, -1), ["a", "b"]
+    )
+    assert "the first-order index of a exceeds the total index" in note
 
 
 def test_sobol_indices_are_refused():

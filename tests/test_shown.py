@@ -19,8 +19,8 @@ from rsfstudy.cli.console_output import LiteralTextConsole
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.quantities import HtmlMarkup, format_symbol_as_html
-from rsfstudy.reductions import SobolIndices
-from rsfstudy.reporting import lattice_tables
+from rsfstudy.reductions import SobolIndices, StatusShares
+from rsfstudy.reporting import lattice_tables, reduction_tables
 from rsfstudy.reporting.text_tables import build_single_scene_result_table, format_rounded_to_error
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
@@ -257,8 +257,27 @@ def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
         done = run(study, rtol=1e-4)
     why = "[1-7] of 8 cells have no value, but the indices require all cells. Use narrower"
     said = " ".join(told_of(done, tmp_path, monkeypatch).split())
-    assert re.search(f"no explained {why}", said)
-    assert re.search(f"<dt>no explained</dt><dd>{why}", done.rsf._repr_html_())
+    assert re.search(f"no explained: {why}", said)
+    assert re.search(f"no explained: {why}", done.rsf._repr_html_())
+
+
+def test_notes_and_shares_of_small_samples_are_shown(tmp_path, monkeypatch):
+    """The table lists only statuses that occur, and the indices of 4 samples have a note."""
+    uncertain = {"b_over_a": norm(2.0, 0.1), "a": uniform(0.01, 0.005)}
+    axis = Axis.samples(uncertain, 4, seed=1, method="saltelli")
+    kinds = [
+        SobolIndices("explained", "critical_stiffness"),
+        StatusShares("ends", "critical_stiffness"),
+    ]
+    done = run(study_of("small", LinearStability(), axis, reductions=kinds))
+    assert done.sizes["ended"] > 20
+    said = " ".join(told_of(done, tmp_path, monkeypatch).split())
+    assert "explained: the Sobol indices are not accurate, because" in said
+    assert "without statuses whose share is 0" in said
+    assert "worker_lost" not in said
+    table = next(t for t in reduction_tables.build_reduction_tables(done) if "ends" in t.rows[0])
+    assert len(table.rows) == 1
+    assert len(table.unformatted_rows) == done.sizes["ended"]
 
 
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])

@@ -43,6 +43,26 @@ def test_values_and_the_original_are_unchanged(results):
     assert results["critical_stiffness"].attrs["units"] == "1"
 
 
+def test_the_comment_describes_the_units_of_the_dataset(results):
+    """The attribute ``scale`` does not exist after a conversion, and the comment follows."""
+    assert "attribute scale" in results.attrs["comment"]
+    scales = {"normal_stress": "5 MPa", "slip_distance": "10 um"}
+    older = results.assign_attrs(
+        comment="Quantities are dimensionless: stress in sigma_*, slip in D_c, time in D_c/V_*, "
+        "slip rate in V_*. The attribute scale of a variable contains its scale."
+    )
+    for before in (results, older):
+        converted = before.rsf.to_si(**scales)
+        for after in (converted, converted.rsf.simplify(), before.rsf.simplify()):
+            assert not any("scale" in one.attrs for one in after.variables.values())
+            assert "attribute scale " not in after.attrs["comment"]
+            assert "Quantities are dimensionless" not in after.attrs["comment"]
+        assert "scales" in converted.attrs["comment"]
+        assert "scales" in converted.attrs
+    own = results.assign_attrs(comment="of the user")
+    assert own.rsf.to_si(**scales).attrs["comment"] == "of the user"
+
+
 def test_plots_of_xarray_have_proper_labels(results):
     axes = Figure().subplots(1, 2)
     simple = results.rsf.simplify()

@@ -8,7 +8,8 @@ from motion_helpers import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import IncompleteWarning, NoResultWarning
+from rsfstudy.errors import IncompleteWarning, InvalidValue, NoResultWarning
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINE_NAMES
 
 
@@ -64,7 +65,9 @@ def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
         cut = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=1e3, budget=500)
     assert cut.attrs["status"] == "work_budget_spent"
     assert cut.sizes["time"] > 10
-    assert cut.attrs["message"].endswith("--budget 2000 (in Python, Accuracy(budget=2000))")
+    assert cut.attrs["message"].endswith("--budget 2000 (in Python, budget=2000)")
+    with pytest.raises(InvalidValue, match=r"pass rtol=\.\.\., budget=\.\.\. or engine="):
+        rsfstudy.simulate(Scene(load_velocity_ratio=1.2), accuracy=Accuracy(budget=2000))
     with pytest.warns(
         IncompleteWarning, match="after 0 of 50 .*: normal_stress_lost .*normal stress vanishes"
     ):

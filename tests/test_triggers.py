@@ -99,7 +99,7 @@ def test_each_trigger_keeps_its_own_answer(engine):
         f"load_velocity_ratio: the budget of {budget} right-hand side evaluations"
         in outcome.message
     )
-    assert outcome.message.endswith(f"Accuracy(budget={4 * budget}))")
+    assert outcome.message.endswith(f"budget={4 * budget})")
     ends = [found[f"critical_{of}_status"] for of in ("normal_stress_step", "displacement")]
     assert ends == [Status.OK, Status.OK]
     assert found["critical_velocity_ratio_status"] == Status.WORK_BUDGET_SPENT

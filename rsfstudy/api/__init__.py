@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rsfstudy.api.result_paths import find_results_file
     from rsfstudy.api.simulation import UNPHYSICAL_MOTION_ATTRIBUTE_NAME, simulate
     from rsfstudy.api.study_runs import (
+        StudyRunWithProgress,
         apply_overrides_to_study,
         make_run_function_with_progress,
         recompute_cell,
@@ -38,6 +39,7 @@ else:
             "api.result_paths": ("find_results_file",),
             "api.simulation": ("UNPHYSICAL_MOTION_ATTRIBUTE_NAME", "simulate"),
             "api.study_runs": (
+                "StudyRunWithProgress",
                 "apply_overrides_to_study",
                 "make_run_function_with_progress",
                 "recompute_cell",
@@ -49,6 +51,7 @@ __all__ = [
     "UNPHYSICAL_MOTION_ATTRIBUTE_NAME",
     "DEFAULT_FREE_PARAMETERS",
     "STIFFNESS_OPTION_FROM_RECORD",
+    "StudyRunWithProgress",
     "apply_overrides_to_study",
     "find_results_file",
     "fit",

@@ -460,7 +460,7 @@ class DatasetAccessor:
 
         See Also
         --------
-        to_dataframe : Convert the dataset to a table without constant columns.
+        to_dataframe : Convert the dataset to a table without constant coordinates.
 
         Examples
         --------
@@ -476,7 +476,7 @@ class DatasetAccessor:
 
     @raise_only_rsfstudy_errors
     def to_dataframe(self, *, decoded: bool = False) -> pd.DataFrame:
-        """Convert the dataset to a table, and omit constant columns.
+        """Convert the dataset to a table, and omit constant coordinates.
 
         Parameters
         ----------
@@ -490,9 +490,11 @@ class DatasetAccessor:
         pandas.DataFrame
             Table with one row per cell of a study, or with one row per time of a motion. Variables
             with additional dimensions inside a cell, such as orbits, are omitted. For other
-            datasets of one scene, the table has a single row. The dictionary ``attrs["constant"]``
-            of the table contains the values of the omitted columns. The dictionary
-            ``attrs["units"]`` contains the units of each numerical column. The units of a
+            datasets of one scene, the table has a single row. The status and all results are
+            columns, even if their values are equal in all rows. The dictionary
+            ``attrs["constant"]`` of the table contains the values of the omitted coordinates and of
+            variables without dimensions. The dictionary ``attrs["units"]`` contains the units of
+            each numerical column and of each number in ``attrs["constant"]``. The units of a
             normalised variable are its scale, such as ``D_c/V_*``.
 
         Raises
@@ -575,19 +577,22 @@ class DatasetAccessor:
         return sample_fitted_parameters(self._dataset, n, seed, posterior=posterior)
 
     @raise_only_rsfstudy_errors
-    def failures(self) -> pd.DataFrame:
-        """Return a table of the cells without a result.
+    def failures(self, *, include_answers: bool = False) -> pd.DataFrame:
+        """Return a table of the failed cells.
 
-        The table contains failed cells, and also cells whose status is an answer without a value,
-        such as ``unstable_at_any_step``. The property ``Status.is_answer`` distinguishes failed
-        cells from cells with an answer.
+        Parameters
+        ----------
+        include_answers : bool, default: False
+            If True, the table contains all cells whose status is not ``ok``. These cells include
+            cells with an answer but without a value, such as ``unstable_at_any_step``, cells whose
+            standard errors are not valid, and cells that are not computed yet.
 
         Returns
         -------
         pandas.DataFrame
-            Table with one row per cell whose status is not ``ok``. The columns are the coordinates
-            of the cell on the axes of the study, ``status`` and ``message``. If the dataset belongs
-            to one scene, the table has no coordinates and at most one row.
+            Table with one row per failed cell. The columns are the coordinates of the cell on the
+            axes of the study, ``status`` and ``message``. If the dataset belongs to one scene, the
+            table has no coordinates and at most one row.
 
         Raises
         ------
@@ -603,17 +608,19 @@ class DatasetAccessor:
         """
         import pandas as pd
 
-        from rsfstudy.reporting import build_data_frame_of_cells
+        from rsfstudy.reporting import build_data_frame_of_cells, find_failed_cells
         from rsfstudy.status import Status
         from rsfstudy.storage import StoredDataset
 
         if self._contains_study_results:
             axes = [axis.dimension for axis in StoredDataset(self._dataset).declaration.axes]
-            return build_data_frame_of_cells(
-                self._dataset, self._dataset["status"] != int(Status.OK), axes
-            )
+            not_ok = self._dataset["status"] != int(Status.OK)
+            listed = not_ok if include_answers else find_failed_cells(self._dataset)
+            return build_data_frame_of_cells(self._dataset, listed, axes)
         ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
-        rows = [] if ended["status"] == Status.OK.label else [ended]
+        answers = {status.label for status in Status if status.is_answer}
+        not_listed = {Status.OK.label} if include_answers else answers
+        rows = [] if ended["status"] in not_listed else [ended]
         return pd.DataFrame(rows, columns=list(ended))
 
     @property

@@ -8,8 +8,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.quantities import replace_comment_on_scales
+
 #: Attribute of a simplified dataset with the values of the omitted coordinates as JSON.
 CONSTANT_COORDINATES_ATTRIBUTE = "constants"
+_COMMENT_ON_SIMPLIFIED_UNITS = (
+    "Variables have the units in their attributes. For dimensionless variables, the units are the "
+    "scale: sigma_* for stress, D_c for slip, D_c/V_* for time, V_* for slip rate. Pure numbers "
+    "have no units."
+)
 
 
 def omit_constants_and_simplify_units(dataset: xr.Dataset) -> xr.Dataset:
@@ -34,6 +41,7 @@ def omit_constants_and_simplify_units(dataset: xr.Dataset) -> xr.Dataset:
     simple = dataset.drop_vars(list(constants)).copy()
     for name in simple.variables:
         simple[name].attrs = _use_scale_attribute_as_units(dataset[name].attrs)
+    simple.attrs = replace_comment_on_scales(dataset.attrs, _COMMENT_ON_SIMPLIFIED_UNITS)
     return simple.assign_attrs({CONSTANT_COORDINATES_ATTRIBUTE: json.dumps(constants)})
 
 

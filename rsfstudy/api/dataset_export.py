@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from typing import Any
 
 import pandas as pd
 import xarray as xr
@@ -20,7 +21,7 @@ from rsfstudy.storage import compare_results_of_same_study
 
 
 def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
-    """Convert a dataset to a table, and omit constant columns.
+    """Convert a dataset to a table, and omit constant coordinates.
 
     Parameters
     ----------
@@ -34,6 +35,11 @@ def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
     pandas.DataFrame
         Table as returned by ``DatasetAccessor.to_dataframe``. If the table would have fewer than
         two rows, no columns are omitted.
+
+    Notes
+    -----
+    The columns must not depend on the results of the cells. The status and the other data variables
+    are therefore columns even if they are constant or NaN in all cells.
     """
     along = [name for name in ("time",) if name in dataset.dims]
     along = list(map(str, dataset["status"].dims)) if "status" in dataset else along
@@ -46,17 +52,31 @@ def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
         for name in table:
             if labels := read_flag_meanings(dataset[name].attrs):
                 table[name] = table[name].map(labels)
-    if len(table) > 1:
-        changing = [n for n in table if n in along or table[n].nunique(dropna=False) > 1]
-        constant = {str(n): table[n].iloc[0] for n in table if n not in changing}
-        table = table[changing]
-        table.attrs["constant"] = constant
-    table.attrs["units"] = {
+    units = {
         str(n): read_units_or_reference_scale(dataset[n].attrs) or "1"
         for n in table
         if table[n].dtype.kind in "iuf"
     }
+    if len(table) > 1:
+        results = [n for n, values in dataset.data_vars.items() if values.dims]
+        columns = [
+            n for n in table if n in (*along, *results) or table[n].nunique(dropna=False) > 1
+        ]
+        constant = {
+            str(n): _remove_rounding_error(table[n].iloc[0]) for n in table if n not in columns
+        }
+        table = table[columns]
+        table.attrs["constant"] = constant
+    table.attrs["units"] = units
     return table
+
+
+def _remove_rounding_error(value: Any) -> Any:
+    """Round a floating-point number to 15 digits, so that 10.000000000000002 becomes 10.
+
+    Other values are returned unchanged.
+    """
+    return float(f"{value:.15g}") if isinstance(value, float) else value
 
 
 def rerun_and_compare_motion(motion: xr.Dataset) -> pd.DataFrame:

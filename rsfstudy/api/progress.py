@@ -7,6 +7,7 @@ import itertools
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 from rich import progress as bars
 from rich.console import Console
@@ -47,7 +48,8 @@ def show_progress(
     ------
     callable
         Function ``update(done, total, remaining_seconds)`` that displays the number of completed
-        cells and the remaining time.
+        cells and the remaining time. If the first call reports completed cells, an earlier run has
+        stored these cells, and the function prints their number.
     """
     console = Console(stderr=True)
     if callable(is_shown_or_callback):
@@ -63,9 +65,14 @@ def show_progress(
         bar = bars.Progress(*told, console=console)
         task = bar.add_task(study_name, total=None)
         began = time.monotonic()
+        is_first_call = True
 
         def update(done: int, total: int, _remaining: float | None = None) -> None:
             """Update the progress bar."""
+            nonlocal is_first_call
+            if is_first_call and done:
+                _print_line(console, study_name, format_reused_cells(done, total, item_name))
+            is_first_call = False
             if time.monotonic() - began >= delay_seconds:
                 bar.start()  # The bar starts late because a run may fail before its first report.
                 bar.update(task, completed=done, total=total)
@@ -87,14 +94,15 @@ def _make_progress_line_printer(
     printed. A short run therefore prints a single line.
     """
     began = said = time.monotonic()
-    told, is_estimated = 0, False
-
-    def print_line(text: str) -> None:
-        console.print(f"{study_name}: {text}", highlight=False, markup=False, soft_wrap=True)
+    told, is_estimated, is_first_call = 0, False, True
+    print_line = partial(_print_line, console, study_name)
 
     def update(done: int, total: int, remaining: float | None = None) -> None:
         """Print a progress line if enough cells have been completed."""
-        nonlocal said, told, is_estimated
+        nonlocal said, told, is_estimated, is_first_call
+        if is_first_call and done:
+            print_line(format_reused_cells(done, total, item_name))
+        is_first_call = False
         now, part = time.monotonic(), _MAX_PROGRESS_LINES * done // total
         left = "" if remaining is None else f", about {format_duration(remaining)} left"
         if now - began < delay_seconds:
@@ -112,6 +120,31 @@ def _make_progress_line_printer(
             )
 
     return update
+
+
+def _print_line(console: Console, study_name: str, text: str) -> None:
+    """Print a line about the run of a study."""
+    console.print(f"{study_name}: {text}", highlight=False, markup=False, soft_wrap=True)
+
+
+def format_reused_cells(reused: int, total: int, item_name: str = "cells") -> str:
+    """Format the number of cells that an earlier run has stored.
+
+    Parameters
+    ----------
+    reused : int
+        Number of cells that are not computed again.
+    total : int
+        Number of all cells.
+    item_name : str, default: "cells"
+        Name of the counted objects.
+
+    Returns
+    -------
+    str
+        Sentence without a full stop, for example "12 of 30 cells were stored by an earlier run".
+    """
+    return f"{reused:,} of {total:,} {item_name} were stored by an earlier run"
 
 
 def compile_equations_and_print_time(

@@ -6,8 +6,8 @@ The main functions are ``run`` and ``open``.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,11 @@ import xarray as xr
 
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.api import dataset_export
-from rsfstudy.api.progress import compile_equations_and_print_time, show_progress
+from rsfstudy.api.progress import (
+    compile_equations_and_print_time,
+    format_reused_cells,
+    show_progress,
+)
 from rsfstudy.api.result_paths import find_results_file, parse_output_path
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
@@ -25,6 +29,7 @@ from rsfstudy.exception_conversion import find_stacklevel_of_user_code, raise_on
 from rsfstudy.execution import (
     OutputOptions,
     ProgressCallback,
+    StudyRun,
     WorkerPool,
     collect_run_fingerprint,
     prepare_study_run,
@@ -263,12 +268,56 @@ def apply_overrides_to_study(
     return declared.with_(**overrides) if overrides else declared
 
 
+@dataclass(frozen=True)
+class StudyRunWithProgress:
+    """Function without arguments that runs a study, and shows the progress of the run.
+
+    Parameters
+    ----------
+    study_run : StudyRun
+        Run of the study.
+    worker_pool : WorkerPool
+        Workers that compute the cells.
+    show_progress_bar : bool or callable
+        If True, show the progress of the run, or report it to a function.
+    """
+
+    study_run: StudyRun
+    worker_pool: WorkerPool
+    show_progress_bar: bool | ProgressCallback
+
+    def __call__(self) -> xr.Dataset:
+        """Compile the equations if necessary, run the study, and return the results."""
+        ready, study = self.study_run, self.study_run.study
+        if study.accuracy.engine == Engine.COMPILED:
+            compile_equations_and_print_time(
+                ready.plan.example_scenes,
+                study.measure.needs_time,
+                self.show_progress_bar is True,
+            )
+        # Fits of a record usually take a few seconds, and then need no progress report.
+        is_fit = study.plot == "fits"
+        appearance: Any = (
+            {"item_name": "fits", "delay_seconds": _FIT_PROGRESS_DELAY_SECONDS} if is_fit else {}
+        )
+        with show_progress(study.name, self.show_progress_bar, **appearance) as show:
+            mapper = self.worker_pool.make_cell_batch_mapper(ready.worker_log_path)
+            return ready(mapper, show)
+
+    @property
+    def note_on_reused_cells(self) -> str:
+        """Number of cells that an earlier run has stored, as a text. Empty if there are none."""
+        reused = self.study_run.reused_cell_count
+        total = len(self.study_run.plan.unique_cell_numbers)
+        return format_reused_cells(reused, total) if reused else ""
+
+
 def make_run_function_with_progress(
     study: Study,
     output_options: OutputOptions,
     worker_pool: WorkerPool,
     show_progress_bar: bool | ProgressCallback = True,
-) -> Callable[[], xr.Dataset]:
+) -> StudyRunWithProgress:
     """Check a study, and return a function that runs the study.
 
     Parameters
@@ -285,7 +334,7 @@ def make_run_function_with_progress(
 
     Returns
     -------
-    callable
+    StudyRunWithProgress
         Function without arguments that runs the study and returns the results.
 
     Raises
@@ -295,22 +344,7 @@ def make_run_function_with_progress(
     """
     Engine.check_is_usable(study.accuracy.engine)
     ready = prepare_study_run(study, output_options, worker_pool)
-    # Fits of a record usually take a few seconds, and then need no progress report.
-    is_fit = study.plot == "fits"
-    appearance: Any = (
-        {"item_name": "fits", "delay_seconds": _FIT_PROGRESS_DELAY_SECONDS} if is_fit else {}
-    )
-
-    def run() -> xr.Dataset:
-        """Compile the equations if necessary, and run the study."""
-        if study.accuracy.engine == Engine.COMPILED:
-            compile_equations_and_print_time(
-                ready.plan.example_scenes, study.measure.needs_time, show_progress_bar is True
-            )
-        with show_progress(study.name, show_progress_bar, **appearance) as show:
-            return ready(worker_pool.make_cell_batch_mapper(ready.worker_log_path), show)
-
-    return run
+    return StudyRunWithProgress(ready, worker_pool, show_progress_bar)
 
 
 @raise_only_rsfstudy_errors

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     )
     from rsfstudy.execution.dask_clusters import connect_to_cluster
     from rsfstudy.execution.provenance import build_provenance_attributes, collect_run_fingerprint
-    from rsfstudy.execution.study_run import OutputOptions, ProgressCallback
+    from rsfstudy.execution.study_run import OutputOptions, ProgressCallback, StudyRun
     from rsfstudy.execution.study_run_preparation import prepare_study_run
     from rsfstudy.execution.worker_pool import WorkerPool
 else:
@@ -30,7 +30,7 @@ else:
             "execution.cell_plan": ("CellPlan",),
             "execution.study_run_preparation": ("prepare_study_run",),
             "execution.provenance": ("build_provenance_attributes", "collect_run_fingerprint"),
-            "execution.study_run": ("OutputOptions", "ProgressCallback"),
+            "execution.study_run": ("OutputOptions", "ProgressCallback", "StudyRun"),
             "execution.worker_pool": ("WorkerPool",),
         },
     )
@@ -39,6 +39,7 @@ __all__ = [
     "OutputOptions",
     "CellPlan",
     "ProgressCallback",
+    "StudyRun",
     "WorkerPool",
     "connect_to_cluster",
     "prepare_study_run",

@@ -112,6 +112,13 @@ class StudyRun:
         If the scene of a cell is invalid, or if a reduction or a claim cannot be applied to the
         lattice. The constructor performs these checks, so errors are raised before any cell is
         computed.
+
+    Attributes
+    ----------
+    reused_cell_count : int
+        Number of cells that an earlier run has stored, and that the run therefore did not compute.
+    written_path : Path or None
+        Path of the results if the run has written them completely, and None otherwise.
     """
 
     def __init__(
@@ -127,6 +134,8 @@ class StudyRun:
             cell_settings,
             workers,
         )
+        self.reused_cell_count = 0
+        self.written_path: Path | None = None
         self.plan = CellPlan(study)
         self.provenance = provenance.collect_provenance(
             study, options.command_line, self.plan.example_scenes
@@ -222,6 +231,8 @@ class StudyRun:
                 self._compute_missing_cells(journal, cell_batch_mapper, progress_callback)
                 return self._write_results(journal)
             except (KeyboardInterrupt, RunError) as error:
+                if self.written_path is not None:
+                    raise
                 raise self._save_partial_results(journal, error) from error
             except DataError as error:
                 raise DataError(f"{error} {self._describe_how_to_resume(journal)}") from error
@@ -237,7 +248,8 @@ class StudyRun:
         # Failed cells are computed again.
         answered = journal.read_statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
         missing = order_cells_by_golden_section(cells[~answered])
-        done, failed, total = int(answered.sum()), 0, len(cells)
+        self.reused_cell_count = int(answered.sum())
+        done, failed, total = self.reused_cell_count, 0, len(cells)
         progress_callback(done, total, None)
         if self.worker_log_path is not None:
             self.worker_log_path.unlink(missing_ok=True)  # An earlier run may have left this file.
@@ -295,7 +307,9 @@ class StudyRun:
             raise RunError(f"a reduction failed ({type(error).__name__}: {error})") from error
         if self.options.output is None:
             return convert_attributes_for_netcdf(results)
-        written = results if zarr else write_dataset(results, self.build_output_path(".nc"))
+        path = self.build_output_path(".zarr" if zarr else ".nc")
+        written = results if zarr else write_dataset(results, path)
+        self.written_path = path
         for stale in (".partial.nc", ".partial.png"):
             self.build_output_path(stale).unlink(missing_ok=True)
         return written

@@ -95,9 +95,13 @@ def replace_former_arguments_by_integrator(
     accuracy, meter = (pair.get(name) for name in _FORMER_ARGUMENT_NAMES)
     if not (isinstance(accuracy, Accuracy) and isinstance(meter, WorkMeter)):
         rule = "must be an Accuracy and a WorkMeter"
-        raise InvalidValue(
-            "accuracy, meter", (accuracy, meter), rule, remedy=_REMEDY_FOR_FORMER_ARGUMENTS
-        )
+        remedy = _REMEDY_FOR_FORMER_ARGUMENTS
+        if isinstance(accuracy, Accuracy) and meter is None:
+            remedy = (
+                "To set the accuracy, pass rtol=..., budget=... or engine=.... In a user-defined "
+                f"measure: {remedy}"
+            )
+        raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=remedy)
     text = (
         "An integrator has replaced the arguments accuracy and meter. "
         f"{_REMEDY_FOR_FORMER_ARGUMENTS}"

@@ -97,7 +97,7 @@ class WorkMeter:
         """Final sentence of an error message, which suggests a fourfold budget."""
         return (
             f". To continue, increase the budget to {4 * self.budget}: --budget "
-            f"{4 * self.budget} (in Python, Accuracy(budget={4 * self.budget}))"
+            f"{4 * self.budget} (in Python, budget={4 * self.budget})"
         )
 
     def check_budget(self) -> None:

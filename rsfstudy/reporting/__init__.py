@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         build_failed_cells_table,
         count_cells_by_status,
         count_pending_cells,
+        find_failed_cells,
         format_notes_on_incomplete_results,
         format_status_counts,
     )
@@ -73,6 +74,7 @@ else:
                 "build_failed_cells_table",
                 "count_cells_by_status",
                 "count_pending_cells",
+                "find_failed_cells",
                 "format_notes_on_incomplete_results",
                 "format_status_counts",
             ),
@@ -140,6 +142,7 @@ __all__ = [
     "describe_scene_and_rig_fields",
     "build_failed_cells_table",
     "build_fit_table",
+    "find_failed_cells",
     "format_notes_on_incomplete_results",
     "format_number_or_dash",
     "format_status_counts",

@@ -60,6 +60,23 @@ def count_failed_cells_by_status(dataset: xr.Dataset) -> Mapping[str, int]:
     }
 
 
+def find_failed_cells(dataset: xr.Dataset) -> xr.DataArray:
+    """Find the cells whose status is a failure. Cells that are not computed yet have not failed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    xarray.DataArray
+        True for each failed cell.
+    """
+    status = dataset["status"]
+    return (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
+
+
 def count_pending_cells(dataset: xr.Dataset) -> int:
     """Count the cells that have not been computed.
 
@@ -141,8 +158,7 @@ def build_failed_cells_table(dataset: xr.Dataset, results_file: str) -> TextTabl
         ``coordinates``, ``status``, ``message`` and ``command``. The value of ``command`` is a
         shell command that recomputes the cell.
     """
-    status = dataset["status"]
-    failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
+    failed = find_failed_cells(dataset)
     found = build_data_frame_of_cells(dataset, failed, list(map(str, failed.dims)))
     first = found[:_MAX_FAILED_CELLS_IN_TABLE]
     places: list[dict[Any, Any]] = first[list(failed.dims)].to_dict("records")

@@ -20,8 +20,8 @@ from rsfstudy.reporting.fit_summaries import summarise_fits
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
 from rsfstudy.reporting.reduction_tables import (
     build_reduction_tables,
-    describe_missing_reduction_results,
     find_reasons_of_refused_reductions,
+    format_notes_on_reductions,
 )
 from rsfstudy.reporting.text_tables import (
     MAX_ROWS_IN_THINNED_TABLE,
@@ -56,9 +56,7 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
     elif not StoredDataset(dataset).is_of_single_scene:
         yield build_primary_output_table(dataset)
         yield from build_reduction_tables(dataset)
-        yield describe_missing_reduction_results(
-            dataset, find_reasons_of_refused_reductions(dataset)
-        )
+        yield from format_notes_on_reductions(dataset, find_reasons_of_refused_reductions(dataset))
         yield from filter(
             None, [dataset_origin_descriptions.format_note_on_low_instability_norms(dataset)]
         )

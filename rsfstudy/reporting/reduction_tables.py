@@ -27,6 +27,8 @@ _SLOPE_TABLE_COLUMN_BY_SUFFIX = {
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
+#: Dimension of the statuses in the results of the reduction ``StatusShares``.
+_STATUS_SHARES_DIMENSION = "ended"
 #: Maximum number of points that a note on missing results lists.
 _MAX_MISSING_POINTS_SHOWN = 4
 #: Columns of the comparison of integrators.
@@ -89,6 +91,12 @@ def _build_slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
     table = build_table_along_dimensions(dataset, slope.dims, columns, description, names)
     about = {"name": reduction_name, "units": units}
     rows = [{**about, **row} for row in table.unformatted_rows]
+    if _STATUS_SHARES_DIMENSION in slope.dims:
+        # Most statuses do not occur. The JSON output contains all statuses.
+        occurs = (slope != 0.0).any([d for d in slope.dims if d != _STATUS_SHARES_DIMENSION])
+        few = dataset.isel({_STATUS_SHARES_DIMENSION: occurs.values})
+        text = f"{description}, without statuses whose share is 0"
+        table = build_table_along_dimensions(few, slope.dims, columns, text, names)
     return replace(table, unformatted_rows=rows)
 
 
@@ -120,13 +128,31 @@ def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTa
     Yields
     ------
     TextTable or str
-        Tables, followed by one sentence per reduction without results.
+        Tables, followed by notes on reductions.
     """
     yield from build_reduction_tables(dataset)
-    reasons = find_reasons_of_missing_reductions(dataset)
-    yield from (
-        ": ".join(note) for note in describe_missing_reduction_results(dataset, reasons).items()
-    )
+    yield from format_notes_on_reductions(dataset, find_reasons_of_missing_reductions(dataset))
+
+
+def format_notes_on_reductions(dataset: xr.Dataset, reasons: Mapping[str, str]) -> list[str]:
+    """Format the reasons why results are missing, and notes on inaccurate results.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    reasons : mapping of str to str
+        Reasons for missing results, by reduction name.
+
+    Returns
+    -------
+    list of str
+        One sentence per reduction without results, followed by the notes that reductions store in
+        the attribute ``note`` of their results.
+    """
+    missing = describe_missing_reduction_results(dataset, reasons)
+    notes = [str(v.attrs["note"]) for v in dataset.data_vars.values() if "note" in v.attrs]
+    return [*map(": ".join, missing.items()), *dict.fromkeys(notes)]
 
 
 def find_reasons_of_refused_reductions(dataset: xr.Dataset) -> dict[str, str]:

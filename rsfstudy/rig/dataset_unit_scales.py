@@ -17,7 +17,11 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.quantities import format_unit_quotient, split_unit_quotient
+from rsfstudy.quantities import (
+    format_unit_quotient,
+    replace_comment_on_scales,
+    split_unit_quotient,
+)
 from rsfstudy.rig.units import compute_conversion_factor
 
 #: Names of velocity ratios and normal stress ratios after the conversion to physical units. The
@@ -40,7 +44,10 @@ DIMENSIONLESS_PREFIX = "dimensionless_"
 DISPLAY_UNITS_OF_STRESS_LENGTH_TIME = {"stress": "MPa", "length": "um", "time": "s"}
 #: Name of the dataset attribute that lists the scales after a conversion.
 UNIT_SCALES_ATTRIBUTE_NAME = "scales"
-
+_COMMENT_ON_CONVERTED_UNITS = (
+    "Variables have the units in their attributes. The attribute scales of the dataset lists the "
+    "scales by which dimensionless values were multiplied."
+)
 
 #: Relative tolerance for the comparison of two scales. The tolerance allows for rounding errors and
 #: for the limited number of digits of printed scales.
@@ -406,6 +413,7 @@ def multiply_variables_by_unit_scales(
     told = ", ".join(
         f"{n} = {_format_number_or_range(s.factor)} {s.units}" for n, s in scales_by_name.items()
     )
+    result.attrs = replace_comment_on_scales(dataset.attrs, _COMMENT_ON_CONVERTED_UNITS)
     return copy_with_cf_encoding(result.assign_attrs({UNIT_SCALES_ATTRIBUTE_NAME: told}))
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.quantities import COMMENT_ON_UNITS_AND_SCALES
 from rsfstudy.status import Status
 from rsfstudy.storage.cell_result_arrays import CellOutputPacker, CellResultArrays
 from rsfstudy.storage.lattice_coordinates import build_variable_attributes
@@ -23,13 +24,8 @@ from rsfstudy.study import Study
 from rsfstudy.vocabulary import find_coverage_content_type
 
 CF_AND_ACDD_CONVENTIONS = "CF-1.11, ACDD-1.3"
-_COMMENT_ON_DIMENSIONLESS_UNITS = (
-    "Quantities are dimensionless: stress in sigma_*, slip in D_c, time in D_c/V_*, slip rate in "
-    "V_*. The attribute scale of a variable contains its scale."
-)
-_COMMENT_ON_RIG_UNITS = (
-    " Axes have the units in their attributes. sigma_star, slip_distance and reference_velocity "
-    "are the scales of each cell."
+_COMMENT_ON_SCALES_OF_RIG = (
+    " sigma_star, slip_distance and reference_velocity are the scales of each cell."
 )
 #: Names of the root attributes that users can set with environment variables. For example, the
 #: variable ``RSFSTUDY_LICENSE`` sets the attribute ``license``.
@@ -153,7 +149,7 @@ def build_root_attributes(
         "title": study.title,
         "summary": study.summary or study.title,
         "keywords": "rate and state friction, spring-slider, stability, stick-slip",
-        "comment": _COMMENT_ON_DIMENSIONLESS_UNITS + (_COMMENT_ON_RIG_UNITS if study.rig else ""),
+        "comment": COMMENT_ON_UNITS_AND_SCALES + _COMMENT_ON_SCALES_OF_RIG * bool(study.rig),
         "Conventions": CF_AND_ACDD_CONVENTIONS,
         "project": "rsfstudy",
         "naming_authority": "rsfstudy",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,9 +25,9 @@ from rsfstudy.errors import Interrupted, RsfStudyError
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
 
     from rsfstudy import Study
+    from rsfstudy.api import StudyRunWithProgress
     from rsfstudy.cli.study_results import StudyResults
 
 _FILE_SUFFIX_BY_FORMAT = {"netcdf": "nc", "zarr": "zarr"}
@@ -52,6 +53,8 @@ class StudyRunOutcome:
         Paths of the results file and the figure.
     reason_for_missing_results : str, optional
         Reason why the study was skipped, or error that ended the run.
+    note_on_reused_cells : str, optional
+        Number of cells that an earlier run has stored, as a text.
     """
 
     study_name: str
@@ -61,6 +64,7 @@ class StudyRunOutcome:
     failure_descriptions: Sequence[str] = ()
     output_files: Sequence[Path] = ()
     reason_for_missing_results: str = ""
+    note_on_reused_cells: str = ""
 
     @property
     def outcome_label(self) -> str:
@@ -171,18 +175,17 @@ def run(command_options: options.CommandOptions) -> int:
     kept = command_options.collect_option_values(
         "output", "format", "fresh", "keep_going", "despite_failures", "command_line"
     )
-    with open_worker_pool(
-        command_options, command_options.output / "workers.log" if command_options.every else None
-    ) as where:
-        ready = [
-            (
-                s,
-                make_run_function_with_progress(
-                    s, OutputOptions(**kept), where, not command_options.quiet
-                ),
-            )
-            for s in studies
-        ]
+    runs: list[StudyRunWithProgress] = []
+    log = command_options.output / "workers.log" if command_options.every else None
+    with (
+        _name_complete_file_after_interrupt(runs),
+        open_worker_pool(command_options, log) as where,
+    ):
+        is_shown = not command_options.quiet
+        for study in studies:
+            kept_by_run = OutputOptions(**kept)
+            runs.append(make_run_function_with_progress(study, kept_by_run, where, is_shown))
+        ready = list(zip(studies, runs, strict=True))
         for study in studies:
             _print_expected_cost(study, command_options)
         if not command_options.every:
@@ -192,6 +195,22 @@ def run(command_options: options.CommandOptions) -> int:
                 command_options.as_json,
             )
         return _run_studies_in_turn(ready, command_options, skipped)
+
+
+@contextlib.contextmanager
+def _name_complete_file_after_interrupt(runs: Sequence[StudyRunWithProgress]) -> Iterator[None]:
+    """Name the complete results file if an interrupt arrives after a study was computed."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        written = [run.study_run for run in runs if run.study_run.written_path is not None]
+        if not written:
+            raise
+        study_name, file = written[-1].study.name, written[-1].written_path
+        raise Interrupted(
+            f"{study_name}: {str(error) or 'interrupted'} after the results were written. {file} "
+            f"is complete. If the figure is missing, use rsfstudy plot {file}"
+        ) from error
 
 
 def _find_studies_with_missing_engine(studies: Sequence[Study]) -> list[StudyRunOutcome]:
@@ -227,7 +246,7 @@ def _print_expected_cost(study: Study, command_options: options.CommandOptions) 
 
 
 def _run_studies_in_turn(
-    studies_with_run_functions: Sequence[tuple[Study, Callable[[], xr.Dataset]]],
+    studies_with_run_functions: Sequence[tuple[Study, StudyRunWithProgress]],
     command_options: options.CommandOptions,
     skipped_run_outcomes: Sequence[StudyRunOutcome],
 ) -> int:
@@ -262,7 +281,7 @@ def _run_studies_in_turn(
 
 
 def _run_study(
-    study: Study, compute_dataset: Callable[[], xr.Dataset], command_options: options.CommandOptions
+    study: Study, compute_dataset: StudyRunWithProgress, command_options: options.CommandOptions
 ) -> StudyRunOutcome:
     """Compute a study, draw its figure, and print a report.
 
@@ -285,7 +304,10 @@ def _run_study(
     _counts, problems = summarise_verdicts_and_failures(dataset, verdicts)
     if not drawn:
         problems.append("no figure")
-    found = StudyRunOutcome(study.name, seconds, results, verdicts, problems, [file, *drawn])
+    reused = compute_dataset.note_on_reused_cells
+    found = StudyRunOutcome(
+        study.name, seconds, results, verdicts, problems, [file, *drawn], "", reused
+    )
     if not command_options.as_json:
         (_print_short_study_report if command_options.every else _print_study_report)(found)
     return found
@@ -314,6 +336,8 @@ def _print_study_report(run_outcome: StudyRunOutcome) -> None:
     print_verdicts(run_outcome.verdicts)
     print_failed_cells(run_outcome.results)
     print_line(f"{run_outcome.study_name}: {format_status_counts(dataset)}")
+    if note := run_outcome.note_on_reused_cells:
+        print_line(f"{note}, and the evaluations include these cells")
     print_line(f"wrote {' and '.join(map(str, run_outcome.output_files))}", soft_wrap=True)
 
 
@@ -335,6 +359,7 @@ def _print_short_study_report(run_outcome: StudyRunOutcome) -> None:
     for line in (
         *([f"overrides: {format_overrides(overrides)}"] if overrides else []),
         *summarise_study_as_text_lines(dataset),
+        *([note] if (note := run_outcome.note_on_reused_cells) else []),
         f"claims: {format_verdict_counts(run_outcome.verdicts) or '-'}",
         f"in {format_duration(run_outcome.elapsed_seconds)}, wrote "
         f"{' and '.join(map(str, run_outcome.output_files))}",

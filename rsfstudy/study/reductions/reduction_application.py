@@ -156,7 +156,8 @@ def apply_reductions(
                 values.attrs.setdefault(
                     "refused", "some of the required cells failed or are missing"
                 )
-            said = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
+            texts = ("comment", "refused", "note")
+            said = {key: values.attrs[key] for key in texts if key in values.attrs}
             about = find_quantity(str(name), quantities).variable_attributes
             about |= {"coverage_content_type": find_coverage_content_type(str(name)), **said}
             if str(name) in stated and stated[str(name)].symbol:

@@ -23,6 +23,8 @@ _BOOTSTRAP_RESAMPLES, _RESAMPLES_PER_BATCH, _RESAMPLING_SEED = 400, 25, 2010
 #: Probabilities of the bounds of the confidence interval.
 _CONFIDENCE_INTERVAL_QUANTILES = (0.025, 0.975)
 _SOBOL_INDEX_NAMES = ("first_order", "total")
+#: Maximum width of a confidence interval without a note that the sample is too small.
+_MAX_INTERVAL_WIDTH_WITHOUT_NOTE = 0.5
 
 
 @make_methods_raise_rsfstudy_errors
@@ -106,7 +108,8 @@ class SobolIndices(Reduction):
         Returns
         -------
         xarray.Dataset
-            Indices and bounds of their confidence intervals.
+            Indices and bounds of their confidence intervals. If the sample is too small for
+            accurate indices, the results have the attribute ``note``.
 
         Raises
         ------
@@ -131,6 +134,8 @@ class SobolIndices(Reduction):
             )
         elif np.isnan(found).any():
             about["refused"] = f"cells failed, or {self.of} has the same value in all cells"
+        if note := self._describe_inaccurate_indices(found, inputs):
+            about["note"] = note
         names = iter(name for name, _text in self._list_result_names_and_descriptions())
         return xr.Dataset(
             {
@@ -139,6 +144,45 @@ class SobolIndices(Reduction):
                 for end in range(3)
             },
             {**{n: c for n, c in of.coords.items() if self.over not in c.dims}, "input": inputs},
+        )
+
+    def _describe_inaccurate_indices(self, found: np.ndarray, inputs: Sequence[str]) -> str:
+        """Return a note if the sample is too small for accurate indices.
+
+        Parameters
+        ----------
+        found : ndarray, shape (..., 2, 3, inputs)
+            Indices and bounds, as `_compute_indices_and_bootstrap_bounds` returns them.
+        inputs : sequence of str
+            Names of the sampled quantities.
+
+        Returns
+        -------
+        str
+            Note that states the largest width of a confidence interval, and the quantities whose
+            first-order index exceeds their total index by more than the errors. The string is empty
+            if the indices are accurate.
+        """
+        first, total = np.moveaxis(found, -3, 0)
+        widths = found[..., 2, :] - found[..., 1, :]
+        widest = float(np.nanmax(widths)) if np.isfinite(widths).any() else 0.0
+        above = (first[..., 1, :] > total[..., 2, :]).reshape(-1, len(inputs)).any(axis=0)
+        problems = []
+        if widest > _MAX_INTERVAL_WIDTH_WITHOUT_NOTE:
+            problems.append(f"a 95 % confidence interval is {widest:.2g} wide")
+        if above.any():
+            names = ", ".join(
+                name for name, is_above in zip(inputs, above, strict=True) if is_above
+            )
+            problems.append(
+                f"the first-order index of {names} exceeds the total index by more than the "
+                "confidence intervals"
+            )
+        if not problems:
+            return ""
+        return (
+            f"{self.name}: the Sobol indices are not accurate, because {' and '.join(problems)}. "
+            "Increase the number n of Axis.samples(..., n, method='saltelli')."
         )
 
     def _read_names_of_sampled_quantities(self, dataset: xr.Dataset) -> list[str]:

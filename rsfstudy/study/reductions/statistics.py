@@ -559,7 +559,14 @@ class StatusShares(Reduction):
         stderr = (smoothed * (1.0 - smoothed) / (count + 3)) ** 0.5
         known = ~(status == int(Status.PENDING)).any(self.over)
         found = {self.name: ended / count, f"{self.name}_stderr": stderr}
-        return xr.Dataset({name: values.where(known) for name, values in found.items()})
+        # Recent versions of xarray keep the attributes of the status, such as its flag meanings.
+        about = {"comment": f"fraction of the cells along {self.over} with each status"}
+        return xr.Dataset(
+            {
+                name: values.where(known).drop_attrs(deep=False).assign_attrs(about)
+                for name, values in found.items()
+            }
+        )
 
 
 @make_methods_raise_rsfstudy_errors
