@@ -65,8 +65,8 @@ class Status(IntEnum):
     ACCURACY_OUT_OF_REACH = (
         15,
         (
-            "the integrator cannot reach the requested accuracy, and a larger budget would not help, "
-            "or the search of a fit did not converge"
+            "the integrator cannot reach the requested accuracy even with a larger budget, or the "
+            "search of a fit did not converge"
         ),
     )
     SLIP_STOPPED = 16, "the slider is not loaded, and its slip rate falls below 10^-290 V_*"
