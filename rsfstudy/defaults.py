@@ -19,6 +19,6 @@ class Defaults:
     FIGURE_FORMATS = ("png", "pdf", "svg")
     #: CPU time limit in s for one cell on a worker. A cell exhausts the default budget of
     #: right-hand-side evaluations long before this time.
-    CELL_TIME_LIMIT = 600.0
+    CELL_CPU_TIME_LIMIT = 600.0
     #: Maximum number of right-hand-side evaluations of a fit to a record.
     FIT_EVALUATION_BUDGET = 50_000_000

@@ -265,7 +265,7 @@ _HTML_TAG_BY_SUB_OR_SUPERSCRIPT_MARK = {"_": "sub", "^": "sup"}
 _HTML_CELL_STYLE_ATTRIBUTE = 'style="text-align: left; vertical-align: top"'
 
 
-class HtmlMarkup(str):
+class HtmlText(str):
     """String of HTML markup that needs no further escaping."""
 
     __slots__ = ()
@@ -289,10 +289,10 @@ class HtmlMarkup(str):
     @classmethod
     def format_table(
         cls, headings: Sequence[str], rows: Iterable[Sequence[object]], caption: str = ""
-    ) -> HtmlMarkup:
+    ) -> HtmlText:
         """Format a table in HTML.
 
-        All strings except ``HtmlMarkup`` objects are escaped.
+        All strings except ``HtmlText`` objects are escaped.
 
         Parameters
         ----------
@@ -329,7 +329,7 @@ def format_quantities_as_html_table(
     caption: str = "",
     *,
     with_values: bool = True,
-) -> HtmlMarkup:
+) -> HtmlText:
     """Format a table of quantities in HTML.
 
     Parameters
@@ -348,7 +348,7 @@ def format_quantities_as_html_table(
     """
     shown = [n for n, text in enumerate(_QUANTITY_TABLE_HEADINGS) if with_values or text != "value"]
     table = (_build_quantity_row(about, value) for about, value in quantities_with_values)
-    return HtmlMarkup.format_table(
+    return HtmlText.format_table(
         [_QUANTITY_TABLE_HEADINGS[n] for n in shown],
         ([row[n] for n in shown] for row in table),
         caption,
@@ -393,7 +393,7 @@ class HtmlTableMixin:
         )
 
 
-def format_symbol_as_html(latex_symbol: str) -> HtmlMarkup:
+def format_symbol_as_html(latex_symbol: str) -> HtmlText:
     """Convert a symbol from LaTeX to HTML that needs no MathJax.
 
     Parameters
@@ -408,15 +408,15 @@ def format_symbol_as_html(latex_symbol: str) -> HtmlMarkup:
         Symbol in italics, with Greek letters, subscripts and superscripts.
     """
     if "$" not in latex_symbol:
-        return HtmlMarkup(HtmlMarkup.escape(latex_symbol))
-    text = HtmlMarkup.escape(latex_symbol.strip("$"))
+        return HtmlText(HtmlText.escape(latex_symbol))
+    text = HtmlText.escape(latex_symbol.strip("$"))
     text = re.sub(r"\\([A-Za-z]+)", lambda found: _find_html_character(found[1]), text)
     text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _format_sub_or_superscript_as_html, text)
     bare = re.sub(r"[{}]|\\.", "", text)
-    return HtmlMarkup(f"<i>{bare}</i>")
+    return HtmlText(f"<i>{bare}</i>")
 
 
-def format_unit_as_html(quantity: Quantity) -> HtmlMarkup:
+def format_unit_as_html(quantity: Quantity) -> HtmlText:
     """Format the unit of a quantity in HTML.
 
     Parameters
@@ -433,7 +433,7 @@ def format_unit_as_html(quantity: Quantity) -> HtmlMarkup:
     if quantity.scale:
         scale = quantity.scale.replace("sigma", r"\sigma")
         return format_symbol_as_html(f"${scale}$")
-    return HtmlMarkup(HtmlMarkup.escape(quantity.units if quantity.units != "1" else ""))
+    return HtmlText(HtmlText.escape(quantity.units if quantity.units != "1" else ""))
 
 
 def _find_html_character(latex_command: str) -> str:
@@ -457,13 +457,13 @@ def _format_sub_or_superscript_as_html(match: re.Match[str]) -> str:
 
 def _format_html_table_cell(value: Any) -> str:
     """Format a value for a cell of an HTML table."""
-    if isinstance(value, HtmlMarkup):
+    if isinstance(value, HtmlText):
         return value
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{value:.6g}"
-    return HtmlMarkup.escape(value)
+    return HtmlText.escape(value)
 
 
 def replace_comment_on_scales(attributes: Mapping[Any, Any], replacement: str) -> dict[Any, Any]:

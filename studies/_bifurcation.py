@@ -153,7 +153,7 @@ class Bifurcation(Measure):
     events: int = 32
     name: ClassVar[str] = "bifurcation"
     primary_output = "period_events"
-    typical_work = 120_000
+    typical_rhs_evaluations = 120_000
     outputs = _OUTPUTS
     dimensions = (Quantity("event", "", "1", "number of the stored event"),)
 
@@ -165,7 +165,7 @@ class Bifurcation(Measure):
             raise InvalidValue("number of events", self.events, "must be at least 4")
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Coordinate values of the dimension ``event``."""
         return {"event": np.arange(1, self.events + 1)}
 
@@ -199,7 +199,7 @@ class Bifurcation(Measure):
         values = self._event_outputs(scene, motion.cycles[-self.events :])
         status, why, of_one = _one_event_cycle_outputs(scene, integrator, motion)
         values |= of_one
-        if motion.approached_periodic_orbit is None:
+        if motion.attracting_periodic_orbit is None:
             growth = _mean_growth(ReturnMap(scene, integrator), motion.cycles, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
             remedy = suggest_raising_event_limit(max(self.transient, self.events), "transient")
@@ -207,9 +207,9 @@ class Bifurcation(Measure):
             if status is Status.OK:
                 status, why = ended.status, ended.message
             return Outcome(status, values, why)
-        values["lyapunov_exponent"] = _lyapunov_exponent(motion.approached_periodic_orbit)
+        values["lyapunov_exponent"] = _lyapunov_exponent(motion.attracting_periodic_orbit)
         values |= {
-            "period_events": float(motion.approached_periodic_orbit.period_in_cycles),
+            "period_events": float(motion.attracting_periodic_orbit.period_in_cycles),
             "period_events_error": 0.0,
         }
         if status is Status.OK and "one_event_log10_peak" not in values:
@@ -256,7 +256,7 @@ def _one_event_cycle_outputs(
     if one is None:
         return Status.OK, "", {}
     again = ReturnMap(scene, integrator.refined()).find_periodic_orbit(
-        one.start_section_coordinates, 1, one.cycles[0].log_slip_rate_range
+        one.start_point_on_poincare_section, 1, one.cycles[0].log_slip_rate_range
     )
     if again is None:
         return Status.OK, "", {}

@@ -102,7 +102,7 @@ class ClockAdvance(Measure):
     cycle_phase: float = 0.5
     name: ClassVar[str] = "clock_advance"
     primary_output = "clock_advance"
-    typical_work = 60_000
+    typical_rhs_evaluations = 60_000
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
@@ -249,7 +249,7 @@ def _find_free_cycle(
     if not approach.follow_cycles_until_converged(MAX_EVENTS):
         return None
     start = ReturnMap(free, integrator).section_coordinates_to_point(
-        approach.last_cycle_as_periodic_orbit.start_section_coordinates
+        approach.last_cycle_as_periodic_orbit.start_point_on_poincare_section
     )
     motion = integrator.follow(free, _event_specifications(free), start=start, with_time=True)
     begin = next(motion).point  # The first event holds the fully evaluated point.
@@ -259,7 +259,7 @@ def _find_free_cycle(
 
 def _event_specifications(scene: Scene) -> list[EventSpecification]:
     """Return the specification of the event at which V reaches the instability norm."""
-    return [rise("log_slip_rate", scene.log_instability_rate)]
+    return [rise("log_slip_rate", scene.log_slip_rate_at_instability)]
 
 
 def _event_times(motion: Iterator[Event], count: int) -> list[float]:
@@ -288,7 +288,7 @@ def _normal_stress_change(scene: Scene) -> Callable[[float], float]:
     assert isinstance(loading, NormalStressOscillation)
     amplitude, angle, lasts = (
         loading.oscillation_amplitude,
-        loading.initial_phase,
+        loading.initial_phase_in_radians,
         loading.oscillation_duration,
     )
     turn = 2.0 * math.pi / loading.oscillation_period

@@ -111,14 +111,14 @@ class Triggers(Measure):
 
     name: ClassVar[str] = "triggers"
     primary_output = "coulomb_ratio"
-    typical_work = 12_000
+    typical_rhs_evaluations = 12_000
     outputs = _OUTPUTS
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     @property
-    def work_by_digits(self) -> Mapping[float, float]:
+    def relative_cost_by_digits(self) -> Mapping[float, float]:
         """Relative number of right-hand-side evaluations for each requested accuracy."""
-        return _NORMAL_STRESS_FALL.work_by_digits
+        return _NORMAL_STRESS_FALL.relative_cost_by_digits
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the critical steps and the corresponding stress changes.

@@ -168,7 +168,7 @@ class ProblemMeasure(Measure):
             Description that can be written as JSON.
         """
         problems = [problem.describe() for problem in self.problems]
-        return {"name": self.name, "problems": problems, **self.plain_fields}
+        return {"name": self.name, "problems": problems, **self.scalar_field_values}
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:

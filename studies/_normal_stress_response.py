@@ -252,7 +252,7 @@ class NormalStressResponse(RecordingMeasure):
     samples: int = 64
     name: ClassVar[str] = "normal_stress_response"
     primary_output = "gain"
-    typical_work = 20_000
+    typical_rhs_evaluations = 20_000
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
@@ -322,7 +322,7 @@ class NormalStressResponse(RecordingMeasure):
             rule = "begins later or ends, but the response is defined for a permanent oscillation"
             remedy = "Leave out oscillation_begin and oscillation_cycles, or use rsfstudy.simulate."
             raise InvalidValue("loading", loading.name, rule, remedy=remedy)
-        if not scene.load_velocity or scene.steady_sliding(scene.log_load_velocity) is None:
+        if not scene.load_velocity or scene.compute_steady_sliding(scene.log_load_velocity) is None:
             why = "the load point is held, or steady sliding is not possible at its velocity"
             return Outcome(Status.NO_STEADY_STATE, message=why)
         decay = -scene.load_velocity * scene.linear_growth_rates(scene.log_load_velocity)[0].real

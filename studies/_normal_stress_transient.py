@@ -168,7 +168,7 @@ class NormalStressTransient(RecordingMeasure):
     phases: int = 300
     name: ClassVar[str] = "normal_stress_transient"
     primary_output = "apparent_alpha"
-    typical_work = 4_000
+    typical_rhs_evaluations = 4_000
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
@@ -263,7 +263,7 @@ class NormalStressTransient(RecordingMeasure):
         step, coupling = scene.parts.loading.segments[0], scene.parts.normal_stress.coupling
         if step.load_velocity != 1.0 or step.displacement:
             return "the load point velocity is not V_* after the step"
-        if coupling is None or coupling[0] or scene.pressure_source.unknowns:
+        if coupling is None or coupling[0] or scene.part_changing_effective_stress.unknowns:
             return "effective normal stress depends on shear stress or pore pressure"
         if step.duration < self.record:
             return "normal stress changes during the record"
@@ -435,14 +435,14 @@ class NormalStressTransient(RecordingMeasure):
             Largest absolute difference. The value is NaN if the law provides no closed form.
         """
         law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
-        if law.relaxation is None or law.depends_on_stress or coupling is None:
+        if law.state_relaxation_function is None or law.depends_on_stress or coupling is None:
             return math.nan
         slip = record.rows[:, MotionRecorder.MOTION_VARIABLE_NAMES.index("slip")]
         read = slip >= self.fit_from
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         # If b is zero, alpha is zero too, and friction does not evolve.
         away = -coupling[1] / scene.b * math.log(ratio) if scene.b else 0.0
-        left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
+        left = np.array([law.state_relaxation_function(away, at) for at in slip[read].tolist()])
         seen = MotionRecorder.get_friction_coefficient(record.rows[read]) - scene.mu_star
         return float(np.abs(seen - scene.b * left).max())
 

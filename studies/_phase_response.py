@@ -72,7 +72,7 @@ class PhaseResponse(Measure):
         ),
         Output("recurrence_interval"),
     )
-    typical_work = 40_000
+    typical_rhs_evaluations = 40_000
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the phase response.

@@ -162,7 +162,7 @@ class SyntheticFit(Measure):
     seed: int = 0
     name: ClassVar[str] = "synthetic_fit"
     primary_output = "deviation"
-    typical_work = 400_000
+    typical_rhs_evaluations = 400_000
     dimensions = (
         Quantity("parameter", "", "", "fitted parameter"),
         Quantity("protocol", "", "", "load point velocities and displacements"),
@@ -200,7 +200,7 @@ class SyntheticFit(Measure):
         return (*by, Output("aic", "", "1", text), order, _FLAGGED_OUTPUT)
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the parameters.
 
         If each window has a separate value of a parameter, the value of the first window is

@@ -168,7 +168,7 @@ class WorkPrecision(ProblemMeasure):
     run_budget: int = 30_000
     name: ClassVar[str] = "work_precision"
     primary_output = "measured_error"
-    typical_work = 25_000
+    typical_rhs_evaluations = 25_000
     outputs = _OUTPUTS
     dimensions = (
         Quantity(
@@ -205,7 +205,7 @@ class WorkPrecision(ProblemMeasure):
         return Accuracy(10.0**-self.requested_digits, self.run_budget, methods, engine)
 
     @property
-    def work_by_digits(self) -> Mapping[float, float]:
+    def relative_cost_by_digits(self) -> Mapping[float, float]:
         """Relative number of right-hand-side evaluations for each requested accuracy.
 
         The work does not depend on the accuracy of the study, because each run has its own

@@ -31,7 +31,9 @@ from ._random_scenes import ALL_QUESTIONS, MOTION_QUESTIONS, random_scene
 
 _ESTIMATED_OUTPUTS = tuple(
     dict.fromkeys(
-        name for question in ALL_QUESTIONS.values() for name in question.measure.outputs_with_error
+        name
+        for question in ALL_QUESTIONS.values()
+        for name in question.measure.names_of_outputs_with_error
     )
 )
 _TIGHTER_RTOL_FACTOR = 0.01
@@ -82,7 +84,7 @@ class Coverage(Measure):
     requested_digits: int = 7
     name: ClassVar[str] = "coverage"
     primary_output = "status_kept"
-    typical_work = 60_000
+    typical_rhs_evaluations = 60_000
     outputs = _OUTPUTS
     dimensions = (
         Quantity("question", "", "", "measure in a random scene"),
@@ -104,7 +106,7 @@ class Coverage(Measure):
             raise InvalidValue("requested_digits", self.requested_digits, rule)
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the results along the dimension ``number``."""
         return {"number": np.array(_ESTIMATED_OUTPUTS, dtype=object)}
 

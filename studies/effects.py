@@ -100,7 +100,7 @@ class EffectCost(Measure):
 
     name: ClassVar[str] = "effect_cost"
     primary_output = "recurrence_interval"
-    typical_work = 20_000
+    typical_rhs_evaluations = 20_000
     outputs = _OUTPUTS
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 

@@ -84,7 +84,7 @@ class RecoveryError(Measure):
     record_by: str = "the model"
     name: ClassVar[str] = "recovered"
     primary_output = "largest_deviation"
-    typical_work = 200_000
+    typical_rhs_evaluations = 200_000
     dimensions = (
         Quantity("parameter", "", "", "fitted parameter"),
         Quantity("loading_of_record", "", "", "loading of the record"),
@@ -120,7 +120,7 @@ class RecoveryError(Measure):
                 raise InvalidValue("looked_for", name, "is not a parameter", choices=PARAMETERS)
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of all parameters."""
         return {"parameter": np.array([*PARAMETERS], dtype=object)}
 

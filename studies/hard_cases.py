@@ -50,7 +50,7 @@ class HardCase(ProblemMeasure):
 
     name: ClassVar[str] = "hard_case"
     primary_output = "measured_error"
-    typical_work = 15_000
+    typical_rhs_evaluations = 15_000
     outputs = (*ERROR_OUTPUTS, Output("answer", "", "1", "the known answer"), Output("ended_as"))
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 

@@ -123,7 +123,7 @@ class StabilisationPressure(Measure):
 
     name: ClassVar[str] = "stabilisation"
     primary_output = "begin_pressure"
-    typical_work = 300_000
+    typical_rhs_evaluations = 300_000
     outputs = _OUTPUTS
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:

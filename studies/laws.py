@@ -216,7 +216,7 @@ study = Study(
             source="K >= b/eps: the spring unloads faster than the state weakens",
             variable="critical_displacement",
             where={"evolution": SLOWNESS_END, "normal_stress": "constant", "stiffness_ratio": 2.0},
-            published=0.5 * base.log_instability_rate,
+            published=0.5 * base.log_slip_rate_at_instability,
             tolerance=1e-7,
             reason="exact: a ln(V/V_*)/K at the norm; the tolerance is a tenth of the requested "
             "accuracy",

@@ -108,7 +108,7 @@ def critical_stiffness_curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
         scene_from_coordinates(row.isel(load_velocity_ratio=-1)),
         row["load_velocity_ratio"].values,
     )
-    slowest = max(scene.min_steady_log_slip_rate(), math.log(rates.min()))
+    slowest = max(scene.find_min_steady_log_slip_rate(), math.log(rates.min()))
     if slowest > math.log(rates.max()) - 0.05:
         return np.full(1, math.nan), np.full(1, math.nan)
     logs = slowest + np.geomspace(0.05, math.log(rates.max()) - slowest, 200)
@@ -130,7 +130,7 @@ def plot_slowest_steady_rate(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
 
     for number in range(dataset.sizes["phi"]):
         row = dataset.isel(phi=number, load_velocity_ratio=-1)
-        slowest = math.exp(scene_from_coordinates(row).min_steady_log_slip_rate())
+        slowest = math.exp(scene_from_coordinates(row).find_min_steady_log_slip_rate())
         if slowest > float(dataset["load_velocity_ratio"].min()):
             axes.axvline(slowest, color=cycle_style(number)["color"], linestyle=":", linewidth=0.8)
             soon = slowest < 1e3 * float(dataset["load_velocity_ratio"].min())

@@ -245,7 +245,7 @@ def plot_rigid_transients(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
     for place in range(dataset.sizes["normal_stress_step"]):
         row = dataset.isel(normal_stress_step=place, stiffness_ratio=0)
         scene = scene_from_coordinates(row)
-        if form := scene.parts.law.relaxation:
+        if form := scene.parts.law.state_relaxation_function:
             away = -scene.alpha / scene.b * math.log1p(float(row["normal_stress_step"]))
             left = scene.b * np.array([form(away, at) for at in slip.tolist()])
             axes.plot(slip, left, ":", color="black", label="rigid")

@@ -248,7 +248,7 @@ def label_slip_modes(case: xr.Dataset, axes: MatplotlibAxes) -> None:
     to_panel = axes.transData + axes.transAxes.inverted()
     heights = to_panel.transform(np.column_stack([np.full(len(y), x[0]), y]))[:, 1]
     box = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0}
-    for mode, name in enumerate(LimitCycle.SLIP_MODES):
+    for mode, name in enumerate(LimitCycle.SLIP_MODE_NAMES):
         here = (case["slip_mode"] == mode).values
         if not here.any():
             continue

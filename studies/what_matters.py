@@ -55,7 +55,9 @@ class Headlines(Measure):
 
     name: ClassVar[str] = "headlines"
     primary_output = "critical_displacement"
-    typical_work = _STEP_MEASURE.typical_work + _CYCLE_MEASURE.typical_work
+    typical_rhs_evaluations = (
+        _STEP_MEASURE.typical_rhs_evaluations + _CYCLE_MEASURE.typical_rhs_evaluations
+    )
     outputs = tuple(Output(name, error=True) for name in INDEXED_OUTPUTS.values())
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 

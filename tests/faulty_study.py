@@ -89,7 +89,7 @@ class Faulty(Measure):
     name: ClassVar[str] = "faulty"
     primary_output: ClassVar[str] = "total"
     variables: ClassVar = {"total": ()}
-    typical_work: ClassVar[int] = 1
+    typical_rhs_evaluations: ClassVar[int] = 1
 
     def compute(self, scene, integrator):
         _busy_wait(float(os.environ.get("FAULT_TAKES", "0")))

@@ -52,7 +52,7 @@ def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = ma
     The motion is integrated without early termination, up to a maximum number of ``peaks``
     of the slip rate.
     """
-    norm, count = scene.log_instability_rate, 0
+    norm, count = scene.log_slip_rate_at_instability, 0
     watches = (
         maximum("log_slip_rate"),
         rise("log_slip_rate", norm, terminal=True),

@@ -68,7 +68,7 @@ class Power(Measure):
     name: ClassVar[str] = "power"
     primary_output = "total"
     variables = {"total": ()}
-    typical_work = 1
+    typical_rhs_evaluations = 1
 
     def compute(self, scene, integrator):
         if self.power == 4:

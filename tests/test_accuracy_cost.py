@@ -166,5 +166,5 @@ def test_the_work_a_user_is_told_is_the_work_it_takes(name, within):
     typical = measure(problem.scene, Accuracy()).rhs_evaluations
     for rtol in (1e-4, 1e-6, 1e-9):
         taken = measure(problem.scene, Accuracy(rtol)).rhs_evaluations
-        told = measure.expected_work(Accuracy(rtol)) / measure.typical_work
+        told = measure.expected_work(Accuracy(rtol)) / measure.typical_rhs_evaluations
         assert told == pytest.approx(taken / typical, rel=within)

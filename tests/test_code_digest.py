@@ -83,7 +83,7 @@ class Own(Measure):
     name: ClassVar[str] = "own"
     primary_output = "total"
     variables = {"total": ()}
-    typical_work = 1
+    typical_rhs_evaluations = 1
     least: float = 0.0
 
     def compute(self, scene, integrator):

@@ -190,7 +190,7 @@ def peak_in_time(scene: Scene) -> float:
 
     The integration in time uses no code of the package.
     """
-    theirs, norm = TimeDomainMotion(scene), scene.log_instability_rate
+    theirs, norm = TimeDomainMotion(scene), scene.log_slip_rate_at_instability
 
     def at_norm(t, y):
         return theirs.rates_and_state(t, y, 0.0)[1].log_slip_rate - norm
@@ -232,7 +232,7 @@ def test_a_second_formulation_agrees_on_both_sides(fields, of):
             stepped = {of: value * (1.0 + side), RATE: held}
         peak = peak_in_time(scene.with_(**stepped))
         # The integration stops at the norm, to rounding error.
-        assert (peak >= scene.log_instability_rate - 1e-9) is reaches
+        assert (peak >= scene.log_slip_rate_at_instability - 1e-9) is reaches
 
 
 # ---- mass
@@ -329,13 +329,13 @@ def test_a_displacement_step_may_jump_to_the_norm_at_once():
     scene = Scene(law="slowness", stiffness_ratio=5.0, instability_norm=0.01)
     value, _error, outcome = found(scene, DISPLACEMENT)
     jump = compute_quasi_static_log_slip_rate(scene, scene.stiffness * value, 0.0)
-    assert jump == pytest.approx(scene.log_instability_rate, rel=1e-8)
+    assert jump == pytest.approx(scene.log_slip_rate_at_instability, rel=1e-8)
     assert "jump" in outcome.message
     with_mass = found(scene.with_(inertia=True), DISPLACEMENT)[0]
     assert with_mass == pytest.approx(value, rel=1e-3)
     # The step also supplies the stress that radiation damping carries at the norm.
     damped = scene.with_(stiffness=scene.stiffness, radiation_damping=1e-7)
-    carried = damped.radiation_damping * math.expm1(scene.log_instability_rate)
+    carried = damped.radiation_damping * math.expm1(scene.log_slip_rate_at_instability)
     more = found(damped, DISPLACEMENT)[0] - value
     assert more == pytest.approx(carried / scene.stiffness, rel=1e-5)
 
@@ -384,7 +384,7 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     """
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
-        assert peak < scene.log_instability_rate
+        assert peak < scene.log_slip_rate_at_instability
         assert not motion_after_step.motion_reaches_instability_norm(
             scene, Integrator(Accuracy(1e-6, 500_000))
         )
@@ -429,7 +429,7 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
     assert start is not None
     system = build_equations_between_ruptures(scene, with_time=False)
     point = system.evaluate_motion_point(start)
-    assert point.log_slip_rate == pytest.approx(scene.log_instability_rate, rel=1e-12)
+    assert point.log_slip_rate == pytest.approx(scene.log_slip_rate_at_instability, rel=1e-12)
     assert point.log_slip_rate_derivative == pytest.approx(0.0, abs=1e-11)
 
 

@@ -157,7 +157,7 @@ class Known(Measure):
     error: float = 0.0
     name: ClassVar[str] = "known"
     primary_output = "y"
-    typical_work = 1
+    typical_rhs_evaluations = 1
     outputs = (Output("y", "", "1", "known", error=True),)
     asked: ClassVar[list[Scene]] = []
 

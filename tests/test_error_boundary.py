@@ -19,7 +19,7 @@ from rsfstudy.argument_checks import MAX_ITEMS_OF_LIST_ARGUMENT, describe_type, 
 from rsfstudy.errors import CallError, DataError, IncompleteWarning, InvalidValue, RsfStudyError
 from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.measures import Measure
-from rsfstudy.quantities import HtmlMarkup
+from rsfstudy.quantities import HtmlText
 from rsfstudy.reductions import ClosedFormRatio, LinearFit, PowerLaw, Range
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.velocity_step import VelocityStep
@@ -266,8 +266,8 @@ def test_numbers_and_lists_of_numpy_match():
 
 def test_constructors_convert_numpy_numbers():
     measure = VelocityStep(phases=np.int8(3), record=np.float32(2.5))
-    assert measure.plain_fields == {"step_number": 1, "record": 2.5, "phases": 3}
-    assert {type(value) for value in measure.plain_fields.values()} == {int, float}
+    assert measure.scalar_field_values == {"step_number": 1, "record": 2.5, "phases": 3}
+    assert {type(value) for value in measure.scalar_field_values.values()} == {int, float}
     assert type(LinearFit("z", of="x", on="y", within=(0.0, 1.0)).within) is tuple
     assert type(Panel(markers_only=np.True_).markers_only) is bool
 
@@ -285,7 +285,7 @@ ESCAPE = "\x1b]0;x\x07\x1b[31m"
 
 
 def test_headings_of_html_are_spelt_out():
-    shown = HtmlMarkup.format_table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
+    shown = HtmlText.format_table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
     assert shown.isprintable()
     assert shown.count("x1b[31m") == 3
 

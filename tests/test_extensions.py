@@ -470,7 +470,7 @@ class Held(Measure):
     name = "held"
     primary_output = "held"
     variables = {"held": ()}  # noqa: RUF012
-    typical_work = 1
+    typical_rhs_evaluations = 1
 
     def compute(self, scene, integrator):
         grip = getattr(scene.parts.dynamics, "grip", 0.0)

@@ -113,7 +113,7 @@ class Pair(Measure):
 
     name = "pair"
     variables = {"v": (), "profile": ("phase",)}  # noqa: RUF012
-    inner_coordinates = {"phase": np.arange(2.0)}  # noqa: RUF012
+    output_coordinates = {"phase": np.arange(2.0)}  # noqa: RUF012
 
 
 LAYOUT = CellOutputPacker(Pair())

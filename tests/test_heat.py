@@ -566,7 +566,7 @@ def test_critical_steps_with_heat():
         scene = Scene(**fields, load_velocity_ratio=step)
         ran = StepResponse(peaks=2, phases=2)(scene, Accuracy(1e-4))
         peaks.append(ran.values["peak_log10_slip_rate"][0] * math.log(10.0))
-    assert peaks[0] < scene.log_instability_rate < peaks[1]
+    assert peaks[0] < scene.log_slip_rate_at_instability < peaks[1]
 
 
 def test_the_named_combinations_are_complete():

@@ -104,7 +104,7 @@ def test_no_smaller_step_runs_away(number):
         at = stepped.with_(**{of: share * critical})
         motion = simulate(at, duration=1e4, rtol=1e-6, budget=20_000, engine=COMPILED)
         highest = math.log(10.0) * motion.log10_slip_rate.max()
-        assert (highest >= scene.log_instability_rate) == (share > 1.0)
+        assert (highest >= scene.log_slip_rate_at_instability) == (share > 1.0)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -155,7 +155,7 @@ def test_springs_far_stiffer_than_critical_end_in_a_status(stiffness_ratio, of, 
     measure = CriticalStep(of=of, direction=direction)
     outcome = measure(scene, Accuracy(1e-4, budget=3_000, engine=COMPILED))
     if of == DISPLACEMENT and direction == "up":
-        jump = scene.a * scene.log_instability_rate / scene.stiffness
+        jump = scene.a * scene.log_slip_rate_at_instability / scene.stiffness
         assert outcome.values["critical_displacement"] == pytest.approx(jump, rel=1e-8)
         assert outcome.values["slip_rate_after_closed_form_step"] == math.inf
     else:

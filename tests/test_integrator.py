@@ -72,7 +72,7 @@ class Twice(Measure):
 
     function: str = "simulate"
     name: ClassVar[str] = "twice"
-    primary_output, typical_work, outputs = "number", 1_000, OUTPUTS
+    primary_output, typical_rhs_evaluations, outputs = "number", 1_000, OUTPUTS
 
     def compute(self, scene, integrator):
         for _ in range(2):
@@ -118,7 +118,7 @@ def define_former_measures() -> tuple[type[Measure], type[Measure]]:
     @dataclass(frozen=True)
     class Former(Measure):
         name: ClassVar[str] = "former"
-        primary_output, typical_work, outputs = "number", 1_000, OUTPUTS
+        primary_output, typical_rhs_evaluations, outputs = "number", 1_000, OUTPUTS
 
         def compute(self, scene, accuracy, meter):
             step = CriticalStep(of="displacement_step").run_nested(scene, accuracy, meter)

@@ -51,7 +51,7 @@ class Scaled(Measure):
     name: ClassVar[str] = "scaled"
     primary_output: ClassVar[str] = "total"
     variables: ClassVar = {"total": ()}
-    typical_work: ClassVar[int] = 1
+    typical_rhs_evaluations: ClassVar[int] = 1
 
     def __post_init__(self):
         if self.factor == 13.0:
@@ -130,7 +130,7 @@ def test_overrides_change_the_measure():
 def test_a_field_that_decides_the_shape_is_refused():
     kind = type("Long", (Scaled,), {
         "variables": {"total": (), "row": ("place",)},
-        "inner_coordinates": property(lambda self: {"place": np.arange(float(self.times))}),
+        "output_coordinates": property(lambda self: {"place": np.arange(float(self.times))}),
     })  # fmt: skip
     assert scaled(Axis("factor", [1.0, 2.0]), measure=kind()).shape == (2, 2)
     with pytest.raises(

@@ -63,7 +63,7 @@ def test_errors_cover_what_both_runs_neglect(measure, rtol, scene):
     A tolerance that is a thousand times smaller leaves the slow manifold earlier.
     """
     found, exact = read(measure, scene, rtol), read(measure, scene, 1e-3 * rtol)
-    for name in measure.outputs_with_error:
+    for name in measure.names_of_outputs_with_error:
         error = abs(found[name] - exact[name])
         assert error <= found[f"{name}_error"] + exact[f"{name}_error"], name
 

@@ -127,7 +127,7 @@ def test_each_number_is_described_once(measure):
     own = {about.name: about for about in measure.quantities}
     assert len(own) == len(measure.quantities)
     assert own.keys() & vocabulary.QUANTITY_BY_NAME.keys() <= SHARED
-    for name in (*measure.variables, *measure.inner_coordinates):
+    for name in (*measure.variables, *measure.output_coordinates):
         nothing_said = Quantity(name, "", "1", name.replace("_", " "))
         assert vocabulary.find_quantity(name, own) != nothing_said
 
@@ -141,7 +141,7 @@ def test_no_outcome_is_ok_without_a_number_that_has_an_error(measure, monkeypatc
     accuracy.
     """
     whole = {
-        name: np.full([len(measure.inner_coordinates[dim]) for dim in dims], 2.0 + number)
+        name: np.full([len(measure.output_coordinates[dim]) for dim in dims], 2.0 + number)
         if dims
         else 2.0 + number
         for number, (name, dims) in enumerate(measure.variables.items())
@@ -158,10 +158,10 @@ def test_no_outcome_is_ok_without_a_number_that_has_an_error(measure, monkeypatc
 
     assert ended(whole) is Status.OK
     assert measure.primary_output in whole
-    assert set(measure.optional_outputs) <= set(measure.outputs_with_error)
-    for name in measure.outputs_with_error:
+    assert set(measure.optional_output_names) <= set(measure.names_of_outputs_with_error)
+    for name in measure.names_of_outputs_with_error:
         for missing in (name, f"{name}_error"):
             assert ended({**whole, missing: whole[missing] * math.nan}) is Status.NOT_FINITE
         rest = {n: v for n, v in whole.items() if n not in (name, f"{name}_error")}
-        may_lack = name in measure.optional_outputs
+        may_lack = name in measure.optional_output_names
         assert ended(rest) is (Status.OK if may_lack else Status.NOT_FINITE)

@@ -29,7 +29,7 @@ class Own(Measure):
     name = "own"
     primary_output = "total"
     variables = {"total": ()}  # noqa: RUF012
-    typical_work = 1
+    typical_rhs_evaluations = 1
 
     def compute(self, scene, integrator):
         integrator.work_meter.charge("any", 7)
@@ -48,7 +48,7 @@ def own(**declared) -> Measure:
 
 def along(values) -> Measure:
     """Return a measure with an inner dimension."""
-    return own(variables={"total": (), "curve": ("x",)}, inner_coordinates={"x": values})
+    return own(variables={"total": (), "curve": ("x",)}, output_coordinates={"x": values})
 
 
 # ---- its numbers have units ---------------------------------------------------------------------
@@ -69,8 +69,8 @@ class Outputs(Measure):
         Output("slip_per_event"),
     )
     dimensions = (Quantity("x", "", "m", "distance along the fault"),)
-    inner_coordinates = {"x": [1.0, 2.0]}  # noqa: RUF012
-    typical_work = 1
+    output_coordinates = {"x": [1.0, 2.0]}  # noqa: RUF012
+    typical_rhs_evaluations = 1
 
     def compute(self, scene, integrator):
         ratio = scene.b_over_a
@@ -91,7 +91,7 @@ def test_a_measure_states_its_outputs_once(tmp_path):
         "logarithm_error": (),
         "slip_per_event": (),
     }
-    assert (*measure.outputs_with_error, *measure.optional_outputs) == (
+    assert (*measure.names_of_outputs_with_error, *measure.optional_output_names) == (
         "total",
         "logarithm",
         "logarithm",
@@ -142,7 +142,7 @@ def test_inner_coordinates_that_are_none(values):
 def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
     class Curve(Own):
         variables = {"total": (), "curve": ("x",)}  # noqa: RUF012
-        inner_coordinates = {"x": values}  # noqa: RUF012
+        output_coordinates = {"x": values}  # noqa: RUF012
 
         def compute(self, scene, integrator):
             return Outcome(Status.OK, {"total": 1.0, "curve": [3, 4]})

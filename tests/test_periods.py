@@ -55,7 +55,7 @@ def test_the_multiplier_of_one_state_is_the_slope_of_its_return_map(law):
     integrator = Integrator(Accuracy(1e-8, 2_000_000))
     approach = LimitCycleSearch(scene, integrator)
     assert approach.follow_cycles_until_converged(300)
-    orbit = follow_motion_to_periodic_orbit(scene, integrator, 64).approached_periodic_orbit
+    orbit = follow_motion_to_periodic_orbit(scene, integrator, 64).attracting_periodic_orbit
     assert orbit.period_in_cycles == 1
     multiplier, forgotten = orbit.floquet_multipliers
     assert multiplier.imag == 0.0
@@ -92,7 +92,7 @@ def test_periods(ratio, period):
     found = LimitCycle(phases=50)(scene, quick(1e-7))
     assert found.status is Status.OK
     assert found.values["period_events"] == period
-    orbit = came_to(scene).approached_periodic_orbit.orbit_starting_at_largest_event
+    orbit = came_to(scene).attracting_periodic_orbit.orbit_starting_at_largest_event
     assert orbit.period_in_cycles == period
     assert orbit.is_attracting
     begin, end = map(
@@ -125,7 +125,7 @@ def test_periods(ratio, period):
 
 
 def test_multipliers_of_a_period_are_those_of_all_its_events():
-    orbit = came_to(slow(0.856)).approached_periodic_orbit
+    orbit = came_to(slow(0.856)).attracting_periodic_orbit
     whole = multiply_return_map_derivatives(orbit.return_map_derivatives_per_cycle)
     size = len(whole)
     assert whole == pytest.approx(

@@ -41,7 +41,12 @@ NAMES = [
     for former in table
 ]
 #: Members that only some kinds of parts have.
-OF_SOME_SLOTS = {"steady_states", "relaxation", "auxiliary_rates", "auxiliary_steady_states"}
+OF_SOME_SLOTS = {
+    "steady_states",
+    "state_relaxation_function",
+    "auxiliary_rates",
+    "auxiliary_steady_states",
+}
 
 
 def find_owner(place: str) -> object:
@@ -209,7 +214,9 @@ def test_points_of_an_axis_may_have_fields_under_the_former_name():
 
 
 def test_reductions_may_define_former_names():
-    with pytest.warns(DeprecationWarning, match="'measured_in' of Doubled .* 'unit_fields'"):
+    with pytest.warns(
+        DeprecationWarning, match="'measured_in' of Doubled .* 'fields_determining_result_units'"
+    ):
 
         @dataclass(frozen=True)
         class Doubled(Reduction):
@@ -218,4 +225,4 @@ def test_reductions_may_define_former_names():
             def __call__(self, dataset):
                 return self.results("twice the value", {"": 2.0 * dataset[self.of]})
 
-    assert Doubled("twice", "critical_stiffness").unit_fields == {"": ("of",)}
+    assert Doubled("twice", "critical_stiffness").fields_determining_result_units == {"": ("of",)}

@@ -23,7 +23,7 @@ def response(rate: float, **fields) -> dict:
     return dict(outcome.values)
 
 
-SLIP = RigidResponse().inner_coordinates["slip"]
+SLIP = RigidResponse().output_coordinates["slip"]
 CONSTANT = {"normal_stress": "constant"}
 
 

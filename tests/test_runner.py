@@ -50,14 +50,14 @@ class Profile(Measure):
 
     name = "profile"
     primary_output = "total"
-    typical_work = 1
+    typical_rhs_evaluations = 1
 
     @property
     def variables(self):
         return {"total": (), "curve": ("phase",)}
 
     @property
-    def inner_coordinates(self):
+    def output_coordinates(self):
         return {"phase": np.linspace(0.0, 1.0, 4)}
 
     def compute(self, scene, integrator):

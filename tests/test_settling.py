@@ -141,7 +141,7 @@ def test_stability_is_computed_at_the_first_settling_event(fluid, level, monkeyp
         scenes.append(scene)
         return compute_largest_linear_growth_rate(scene, log_slip_rate)
 
-    monkeypatch.setattr(Scene, "largest_linear_growth_rate", growth_rate)
+    monkeypatch.setattr(Scene, "compute_largest_linear_growth_rate", growth_rate)
     scene = Scene(**CYCLES, fluid=fluid)
     events_until_third_rise(scene, approach_to_steady_state(level))
     assert bool(scenes) == (fluid is Dissipation)

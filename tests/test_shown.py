@@ -18,7 +18,7 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli.console_output import LiteralTextConsole
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
-from rsfstudy.quantities import HtmlMarkup, format_symbol_as_html
+from rsfstudy.quantities import HtmlText, format_symbol_as_html
 from rsfstudy.reductions import SobolIndices, StatusShares
 from rsfstudy.reporting import lattice_tables, reduction_tables
 from rsfstudy.reporting.text_tables import build_single_scene_result_table, format_rounded_to_error
@@ -106,7 +106,7 @@ def test_symbols_need_no_mathjax(formula, written):
 
 
 def test_texts_of_strangers_stay_texts():
-    assert "<script>" not in HtmlMarkup.format_table(["<script>"], [["<script>"]], "<script>")
+    assert "<script>" not in HtmlText.format_table(["<script>"], [["<script>"]], "<script>")
 
 
 def test_the_accessor_shows_numbers_and_verdicts():

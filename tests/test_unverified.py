@@ -61,7 +61,7 @@ class Known(Measure):
     name: ClassVar[str] = "known_to_a_hundredth"
     primary_output = "known"
     variables: ClassVar[Mapping] = dict.fromkeys(("known", "known_error", "mean", "mean_error"), ())
-    typical_work = 1
+    typical_rhs_evaluations = 1
 
     def error_scales(self, scene, values):
         return {"known": self.relative_to} if self.relative_to else {}

@@ -186,7 +186,7 @@ class PeakFriction(Measure):
     """Measure of the maximum of friction, as in the documentation."""
 
     name: ClassVar[str] = "peak_friction"
-    primary_output, typical_work = "peak_friction", 500
+    primary_output, typical_rhs_evaluations = "peak_friction", 500
     outputs = (Output("peak_friction", r"$\mu_p$", "1", "largest friction after the step"),)
 
     def compute(self, scene, integrator):

@@ -70,7 +70,7 @@ def calling(part: type) -> dict[str, Any]:
     """Return the fields that select a part."""
     if part is SliderParameters:
         return {}
-    if field_name := part.selecting_field_name:
+    if field_name := part.field_name_that_selects_part:
         return {field_name: True if is_boolean_field(part, field_name) else 1.0}
     slot = next(slot for slot in PART_SLOTS if part in slot.built_in_parts.values())
     return (
@@ -113,7 +113,7 @@ def foreign() -> Iterator[tuple[dict[str, Any], str]]:
                 calls = calling(other)
                 for name in sorted(
                     {*list_part_field_names(part)}
-                    - {*list_part_field_names(other), part.selecting_field_name}
+                    - {*list_part_field_names(other), part.field_name_that_selects_part}
                 ):
                     if PART_CLASS_BY_FIELD_NAME[name] is part:
                         yield {**calls, name: 0.5}, name
@@ -128,7 +128,7 @@ def test_no_field_is_taken_for_nothing(fields, name):
 
 
 def test_rig_options_are_described_as_the_quantities_of_a_rig():
-    meanings = {name: quantity.meaning for name, quantity in Rig.QUANTITIES.items()}
+    meanings = {name: quantity.description for name, quantity in Rig.QUANTITIES.items()}
     assert (
         meanings | {"load_velocity": "load point velocity"} == rig_options.MEANINGS_OF_RIG_OPTIONS
     )
@@ -167,7 +167,7 @@ def own(**declared) -> Measure:
         "name": "own",
         "primary_output": "total",
         "variables": {"total": ()},
-        "typical_work": 1,
+        "typical_rhs_evaluations": 1,
     }
     return type("Own", (Measure,), usual | declared)()
 

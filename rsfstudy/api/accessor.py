@@ -437,7 +437,7 @@ class DatasetAccessor:
             peak * float(compute_conversion_factor("max_slip_rate", peak.attrs["units"], "m/s"))
             >= least
         )
-        modes, slow = self._dataset["slip_mode"], LimitCycle.SLIP_MODES.index("slow_slip")
+        modes, slow = self._dataset["slip_mode"], LimitCycle.SLIP_MODE_NAMES.index("slow_slip")
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
 
     @raise_only_rsfstudy_errors
@@ -613,7 +613,7 @@ class DatasetAccessor:
         from rsfstudy.storage import StoredDataset
 
         if self._contains_study_results:
-            axes = [axis.dimension for axis in StoredDataset(self._dataset).declaration.axes]
+            axes = [axis.dimension for axis in StoredDataset(self._dataset).study_declaration.axes]
             not_ok = self._dataset["status"] != int(Status.OK)
             listed = not_ok if include_answers else find_failed_cells(self._dataset)
             return build_data_frame_of_cells(self._dataset, listed, axes)
@@ -638,7 +638,7 @@ class DatasetAccessor:
         """Raise ``DataError`` if a selection has removed an axis."""
         from rsfstudy.storage import StoredDataset
 
-        axes = [axis.dimension for axis in StoredDataset(self._dataset).declaration.axes]
+        axes = [axis.dimension for axis in StoredDataset(self._dataset).study_declaration.axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
             text = (

@@ -148,7 +148,7 @@ def build_fitted_scene(dataset: xr.Dataset) -> Scene:
         Scene of the fit.
     """
     one = _select_single_fit(dataset)
-    declared = StoredDataset(dataset).declaration
+    declared = StoredDataset(dataset).study_declaration
     first = build_scene_from_stored_fields(declared.base)
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))

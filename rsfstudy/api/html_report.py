@@ -31,7 +31,7 @@ from rsfstudy.exception_conversion import (
 )
 from rsfstudy.execution import build_provenance_attributes
 from rsfstudy.formatting import format_count_with_noun, format_overrides
-from rsfstudy.quantities import HtmlMarkup
+from rsfstudy.quantities import HtmlText
 from rsfstudy.reporting import (
     SummaryTableOrSentence,
     TextTable,
@@ -176,7 +176,7 @@ def _build_html_page(directory: Path, file_sections: list[_ReportSectionOfFile])
     """Return the HTML text of the page."""
     rows = [
         {
-            "results": HtmlMarkup(
+            "results": HtmlText(
                 f'<a href="#{one.html_anchor}">{_escape_for_html(one.results_path.stem)}</a>'
             ),
             "title": one.title,
@@ -249,7 +249,7 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Repor
         return _ReportSectionOfFile(
             results_path, title, "", status.label.replace("_", " "), colour, (figure, numbers)
         )
-    about = StoredDataset(dataset).declaration
+    about = StoredDataset(dataset).study_declaration
     parts = [_format_table_or_sentence_as_html(about.summary)] if about.summary else []
     if about.overrides:
         parts.append(
@@ -307,7 +307,7 @@ def format_dataset_as_html(dataset: xr.Dataset) -> str:
 
 def _escape_for_html(text: object) -> str:
     """Escape a string and its control characters for HTML."""
-    return HtmlMarkup.escape(text)
+    return HtmlText.escape(text)
 
 
 def _format_html_paragraph(text: str, colour: str = "") -> str:
@@ -340,13 +340,13 @@ def _format_table_or_sentence_as_html(table_or_sentence: SummaryTableOrSentence)
         }
         whole[list(row)[-1]] += f" {colour}"
         texts = {
-            head: c if isinstance(c, HtmlMarkup) else _escape_for_html(c) for head, c in row.items()
+            head: c if isinstance(c, HtmlText) else _escape_for_html(c) for head, c in row.items()
         }
-        rows_.append([HtmlMarkup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
+        rows_.append([HtmlText(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
     caption = _format_html_paragraph(table_or_sentence.caption) if table_or_sentence.caption else ""
     if not rows_:
         return ""
-    table = HtmlMarkup.format_table(list(table_or_sentence.rows[0]), rows_)
+    table = HtmlText.format_table(list(table_or_sentence.rows[0]), rows_)
     return f'{caption}<div class="wide">{table}</div>'
 
 

@@ -333,16 +333,16 @@ def _convert_recording_to_dataset(
         find_quantity(name): recorded_rows[:, column]
         for column, name in enumerate(MotionRecorder.MOTION_VARIABLE_NAMES)
     }
-    first = MotionRecorder.FIRST_STATE_COLUMN + scene.state_count - len(fluid)
+    first = MotionRecorder.FIRST_STATE_COLUMN_INDEX + scene.state_count - len(fluid)
     columns |= {about: recorded_rows[:, first + i] for i, about in enumerate(fluid)}
-    after_law = MotionRecorder.FIRST_STATE_COLUMN + scene.parts.law.state_count
+    after_law = MotionRecorder.FIRST_STATE_COLUMN_INDEX + scene.parts.law.state_count
     heat = scene.parts.temperature.unknowns
     columns |= {about: recorded_rows[:, after_law + i] for i, about in enumerate(heat)}
     if scene.parts.law.state_count > 1:
         of_law = range(scene.parts.law.state_count)
         columns |= {
             _build_state_variable_quantity(i + 1): recorded_rows[
-                :, MotionRecorder.FIRST_STATE_COLUMN + i
+                :, MotionRecorder.FIRST_STATE_COLUMN_INDEX + i
             ]
             for i in of_law
         }
@@ -365,7 +365,7 @@ def _convert_recording_to_dataset(
     }
     dataset["regime"] = (
         "time",
-        recorded_rows[:, MotionRecorder.REGIME_COLUMN].astype(np.int8),
+        recorded_rows[:, MotionRecorder.REGIME_COLUMN_INDEX].astype(np.int8),
         flags,
     )
     about_rate = find_quantity("reference_rate").variable_attributes
@@ -444,7 +444,7 @@ def _compute_log_instability_slip_rate(scene: Scene) -> float:
         return math.inf
     loads = np.asarray(scene.parts.loading.segment_table)[:, SEGMENT_VELOCITY]
     fastest = math.log(max(1.0, float(abs(loads).max())))
-    norm = scene.log_instability_rate
+    norm = scene.log_slip_rate_at_instability
     return norm if norm > fastest else fastest + math.log(_INSTABILITY_SLIP_RATE_OVER_LOAD_RATE)
 
 
@@ -520,7 +520,7 @@ def make_row_times_strictly_increasing(recorded_rows: np.ndarray) -> np.ndarray:
         np.diff(
             np.delete(
                 recorded_rows,
-                [MotionRecorder.REGIME_COLUMN, MotionRecorder.SAMPLE_NUMBER_COLUMN],
+                [MotionRecorder.REGIME_COLUMN_INDEX, MotionRecorder.SAMPLE_NUMBER_COLUMN_INDEX],
                 axis=1,
             ),
             axis=0,

@@ -297,7 +297,7 @@ def _compute_measure_as_dataset(
         warnings.warn(text, NoResultWarning, stacklevel=4)
     elif outcome.message:
         warnings.warn(outcome.message, RsfStudyWarning, stacklevel=4)
-    own, inner = {about.name: about for about in measure.quantities}, measure.inner_coordinates
+    own, inner = {about.name: about for about in measure.quantities}, measure.output_coordinates
     variables: dict[str, Any] = {}
     for name, dims in measure.variables.items():
         values = outcome.values.get(name)
@@ -313,7 +313,7 @@ def _compute_measure_as_dataset(
     rate = (), scene.reference_rate, find_quantity("reference_rate").variable_attributes
     norm = (
         (),
-        math.exp(scene.log_instability_rate),
+        math.exp(scene.log_slip_rate_at_instability),
         find_quantity("instability_slip_rate").variable_attributes,
     )
     what = measure.name.replace("_", " ").capitalize()

@@ -37,7 +37,7 @@ from rsfstudy.execution import (
 from rsfstudy.measures import Outcome
 from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.quantities import HtmlMarkup
+from rsfstudy.quantities import HtmlText
 from rsfstudy.reporting import (
     format_note_on_low_instability_norms,
     format_notes_on_incomplete_results,
@@ -67,7 +67,7 @@ class StudiesByName(dict[str, Study]):
             (name, study.title, f"{study.size:,}", ", ".join({c.id: c for c in study.claims}))
             for name, study in self.items()
         ]
-        return HtmlMarkup.format_table(("study", "title", "cells", "claims"), rows)
+        return HtmlText.format_table(("study", "title", "cells", "claims"), rows)
 
 
 @raise_only_rsfstudy_errors
@@ -93,7 +93,7 @@ _FIT_PROGRESS_DELAY_SECONDS = 20.0
 
 
 @raise_only_rsfstudy_errors
-@SceneFields.decorator_adding_fields_to_signature()
+@SceneFields.add_fields_to_signature()
 def run(
     study: str | Path | Study,
     *,
@@ -105,7 +105,7 @@ def run(
     rtol: float | None = None,
     engine: str | None = None,
     budget: int | None = None,
-    time_limit: float = Defaults.CELL_TIME_LIMIT,
+    time_limit: float = Defaults.CELL_CPU_TIME_LIMIT,
     keep_going: bool = False,
     despite_failures: bool = False,
     format: str = "netcdf",
@@ -550,7 +550,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     0
     """
     results = _open_dataset_if_name_or_path(dataset)
-    declared = StoredDataset(results).declaration
+    declared = StoredDataset(results).study_declaration
     return build_verdict_table(results, list(declared.claims), declared.overrides)
 
 
@@ -563,7 +563,7 @@ def rerun(
     client: Any = None,
     output: str | Path | None = None,
     progress: bool = True,
-    time_limit: float = Defaults.CELL_TIME_LIMIT,
+    time_limit: float = Defaults.CELL_CPU_TIME_LIMIT,
 ) -> pd.DataFrame:
     """Recompute the results in a file, and compare the values.
 

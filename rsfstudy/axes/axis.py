@@ -152,9 +152,9 @@ class Axis:
     ['granite', 'gouge']
     """
 
-    point_fields_getter = staticmethod(get_fields_of_axis_point)
-    storable_text_checker = staticmethod(check_storable_text)
-    plain_value_converter = staticmethod(to_plain_value)
+    get_fields_of_point = staticmethod(get_fields_of_axis_point)
+    check_storable_text = staticmethod(check_storable_text)
+    convert_to_plain_value = staticmethod(to_plain_value)
 
     dimension: str
     rows: tuple[AxisPointFieldValues, ...]
@@ -398,10 +398,10 @@ class Axis:
             Axis with the same dimension and the same labels.
         """
         return Axis(
-            self.dimension, self._convert_rows_to_constructor_values(rows), units, sampling_info
+            self.dimension, self._convert_stored_rows_to_axis_values(rows), units, sampling_info
         )
 
-    def _convert_rows_to_constructor_values(self, rows: Sequence[AxisPointFieldValues]) -> Any:
+    def _convert_stored_rows_to_axis_values(self, rows: Sequence[AxisPointFieldValues]) -> Any:
         """Convert the rows to the format that ``Axis`` accepts as ``values``."""
         if self.labels is not None:
             return {label: dict(row) for label, row in zip(self.labels, rows, strict=True)}
@@ -442,7 +442,7 @@ class Axis:
         stated = {name: about for name, about in beside.items() if about}
         return {
             "dimension": self.dimension,
-            "values": self._convert_rows_to_constructor_values(self.rows),
+            "values": self._convert_stored_rows_to_axis_values(self.rows),
             **stated,
         }
 

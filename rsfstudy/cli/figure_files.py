@@ -87,7 +87,7 @@ def load_user_figure_or_default(dataset: xr.Dataset, study_file: Path | None) ->
         cannot be loaded and the user passed no study file, ``load_user_figure_or_default`` prints a
         note and returns "lines". The results are then drawn as maps or lines.
     """
-    if StoredDataset(dataset).declaration.plot in FIGURE_NAMES:
+    if StoredDataset(dataset).study_declaration.plot in FIGURE_NAMES:
         return None
     try:
         return load_user_figure(dataset, study_file)
@@ -158,7 +158,7 @@ def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) 
     path, because the results may come from an untrusted source.
     """
     name, named_in = (
-        StoredDataset(results).declaration.plot,
+        StoredDataset(results).study_declaration.plot,
         StoredDataset(results).provenance["declared_in"],
     )
     if study_file is None:

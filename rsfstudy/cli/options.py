@@ -240,7 +240,7 @@ worker_pool_options = combine_option_decorators(
         "--time-limit",
         type=float,
         metavar="SECONDS",
-        default=Defaults.CELL_TIME_LIMIT,
+        default=Defaults.CELL_CPU_TIME_LIMIT,
         help="Maximum CPU time per cell in a worker process, in seconds.",
     ),
     quiet_option,

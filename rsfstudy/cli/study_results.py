@@ -54,7 +54,7 @@ class StudyResults:
     @property
     def overrides(self) -> Mapping[str, Any]:
         """Overridden values, which differ from the declaration of the study."""
-        return StoredDataset(self.dataset).declaration.overrides
+        return StoredDataset(self.dataset).study_declaration.overrides
 
     @property
     def pending_cell_count(self) -> int:
@@ -72,7 +72,7 @@ class StudyResults:
         return not (self.pending_cell_count or self.failed_cells_table.rows)
 
     @cached_property
-    def verdicts(self) -> pd.DataFrame:
+    def claim_verdicts(self) -> pd.DataFrame:
         """Table of the claims of the study and their verdicts."""
         return check(self.dataset)
 
@@ -102,8 +102,8 @@ def collect_verdicts(study_results: Sequence[StudyResults]) -> pd.DataFrame:
         by the numbers in the identifiers of the claims.
     """
     if len(study_results) == 1:
-        return study_results[0].verdicts
-    together = pd.concat([one.verdicts.assign(study=one.study_name) for one in study_results])
+        return study_results[0].claim_verdicts
+    together = pd.concat([one.claim_verdicts.assign(study=one.study_name) for one in study_results])
     if "note" in together:  # Studies without notes have no such column.
         together["note"] = together["note"].fillna("")
     number = together["id"].astype(str).str.extract(r"(\d+)", expand=False).astype(float)

@@ -111,7 +111,10 @@ class CriticalPath(NamedTuple):
         CriticalPath
             Path with the load point velocity of the scene.
         """
-        slow, x = scene.equations_between_ruptures(with_time=False), scene.log_instability_rate
+        slow, x = (
+            scene.equations_between_ruptures(with_time=False),
+            scene.log_slip_rate_at_instability,
+        )
         weakest = scene.parts.normal_stress.compute_frictional_stress_lower_bound(scene)
         begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
         tangency, planar = (

@@ -162,7 +162,7 @@ class CriticalStep(Measure):
     name: ClassVar[str] = "critical_step"
     #: Beginning of the warning that the instability norm is a slow slip rate.
     SLOW_NORM_WARNING_PREFIX: ClassVar = SLOW_INSTABILITY_NORM_WARNING_PREFIX
-    typical_work = 4_000
+    typical_rhs_evaluations = 4_000
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     def __post_init__(self) -> None:
@@ -195,7 +195,7 @@ class CriticalStep(Measure):
         return (self.of,)
 
     @property
-    def work_by_digits(self) -> Mapping[float, float]:
+    def relative_cost_by_digits(self) -> Mapping[float, float]:
         """Relative cost of the computation for each requested number of digits.
 
         The relative costs were measured for velocity steps in the study ``accuracy_cost``.

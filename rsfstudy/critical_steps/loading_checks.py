@@ -88,7 +88,7 @@ def build_slow_instability_norm_warning(scene: Scene, load_velocity: float) -> s
     str
         The warning, or an empty string.
     """
-    rate, load = math.exp(scene.log_instability_rate), max(1.0, abs(load_velocity))
+    rate, load = math.exp(scene.log_slip_rate_at_instability), max(1.0, abs(load_velocity))
     if (
         rate >= _MIN_INSTABILITY_NORM_OVER_LOAD_VELOCITY * load
         or scene.reference_rate == SliderParameters.reference_rate

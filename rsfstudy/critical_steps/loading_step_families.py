@@ -302,7 +302,7 @@ def compute_slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
     rate : float
         Slip rate immediately after the step without inertia, in units of V_*.
     """
-    rate = math.exp(scene.quasi_static_log_slip_rate(scene.spring_stress_step, 0.0))
+    rate = math.exp(scene.compute_quasi_static_log_slip_rate(scene.spring_stress_step, 0.0))
     return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate
 
 

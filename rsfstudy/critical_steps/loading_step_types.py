@@ -108,11 +108,11 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
         can be steady.
         """
         if self.sign > 0:
-            return self.scene.log_instability_rate
-        scene, slowest = self.scene, self.scene.min_steady_log_slip_rate()
+            return self.scene.log_slip_rate_at_instability
+        scene, slowest = self.scene, self.scene.find_min_steady_log_slip_rate()
         return (
             min(-math.log(MIN_SEARCHED_LOAD_VELOCITY), -slowest)
-            if scene.log_instability_rate > 0.0
+            if scene.log_slip_rate_at_instability > 0.0
             else 0.0
         )
 
@@ -195,7 +195,9 @@ class DisplacementStepFamily(LoadingStepFamily):
         """
 
         def after(step: float) -> float:
-            log_slip_rate = self.scene.quasi_static_log_slip_rate(self.scene.stiffness * step, 0.0)
+            log_slip_rate = self.scene.compute_quasi_static_log_slip_rate(
+                self.scene.stiffness * step, 0.0
+            )
             return math.exp(log_slip_rate) if log_slip_rate < _LOG_OF_MAX_FLOAT else math.inf
 
         weakening = self.scene.parts.law.b_over_a - 1.0
@@ -233,20 +235,20 @@ class DisplacementStepFamily(LoadingStepFamily):
         stress is zero.
         """
         scene = self.scene
-        if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
+        if max(0.0, scene.log_load_velocity) >= scene.log_slip_rate_at_instability:
             return 0.0
         if self.sign < 0:
             weakest = scene.parts.normal_stress.compute_frictional_stress_lower_bound(scene)
             return min(scene.mu_star, -weakest) / scene.stiffness
         farther = LOG_RATE_ADDED_TO_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
         friction = scene.frictional_stress_from_strength(
-            scene.a * (scene.log_instability_rate + farther)
+            scene.a * (scene.log_slip_rate_at_instability + farther)
         )
         if friction is None:
             return _MAX_SPRING_STRESS_AFTER_STEP / scene.stiffness
         self.largest_step_immediately_reaches_norm = True
         return (
-            friction + scene.dynamics.radiated_stress(scene.log_instability_rate)
+            friction + scene.dynamics.radiated_stress(scene.log_slip_rate_at_instability)
         ) / scene.stiffness
 
 
@@ -374,9 +376,9 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         after which sliding can be steady.
         """
         scene = self.scene
-        if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
+        if max(0.0, scene.log_load_velocity) >= scene.log_slip_rate_at_instability:
             return 0.0
-        level = scene.log_instability_rate + (
+        level = scene.log_slip_rate_at_instability + (
             LOG_RATE_ADDED_TO_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
         )
 
@@ -421,7 +423,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         """
         scene = self.build_scene_with_step(step_size)
         load = scene.log_load_velocity
-        return load == -math.inf or scene.steady_sliding(load) is not None
+        return load == -math.inf or scene.compute_steady_sliding(load) is not None
 
     def _compute_log_slip_rate_after_step(self, step_size: float) -> float:
         """Return ln(V/V_*) immediately after the step, without inertia."""

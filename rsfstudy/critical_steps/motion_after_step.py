@@ -62,7 +62,7 @@ class _OrbitOutcome:
     ----------
     log_slip_rate_peaks : tuple of float
         Values of ln V at the peaks of ln V.
-    reached_instability_norm : bool
+    has_reached_instability_norm : bool
         True if the motion has reached the instability norm.
     point_where_growth_was_too_slow : MotionPoint, optional
         Peak of ln V at which the integration ended because the orbit grows too slowly.
@@ -71,7 +71,7 @@ class _OrbitOutcome:
     """
 
     log_slip_rate_peaks: tuple[float, ...]
-    reached_instability_norm: bool
+    has_reached_instability_norm: bool
     point_where_growth_was_too_slow: MotionPoint | None = None
     initial_log_slip_rate: float = -math.inf
 
@@ -138,7 +138,7 @@ def compute_log_rate_above_instability_norm(scene: Scene, integrator: Integrator
     if scene.log_load_velocity == -math.inf:
         return compute_peak_log_rate_excess_over_norm(scene, integrator)
     steady = find_steady_sliding_and_stability_margin(scene)
-    norm, heavy = scene.log_instability_rate, is_slow_manifold_inaccurate(scene, integrator)
+    norm, heavy = scene.log_slip_rate_at_instability, is_slow_manifold_inaccurate(scene, integrator)
     if (
         has_closed_orbits_at_critical_stiffness(scene)
         and abs(steady.stability_margin) < integrator.result_tolerance()
@@ -147,7 +147,7 @@ def compute_log_rate_above_instability_norm(scene: Scene, integrator: Integrator
         if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return top - norm
     first = _follow_one_orbit(scene, steady, None, integrator, with_inertia=heavy)
-    reached = first.reached_instability_norm
+    reached = first.has_reached_instability_norm
     if first.point_where_growth_was_too_slow is not None:
         at = first.point_where_growth_was_too_slow
         reached = _slow_orbit_grows_to_instability_norm(
@@ -172,7 +172,7 @@ def _compute_max_log_rate_of_closed_orbit(scene: Scene, integrator: Integrator) 
     )
     rising, norm = (
         equations.evaluate_motion_point(start).log_slip_rate_derivative > 0.0,
-        scene.log_instability_rate,
+        scene.log_slip_rate_at_instability,
     )
     specs = (_SLIP_RATE_PEAK_SPECIFICATION, minimum("log_slip_rate"), rise("log_slip_rate", norm))
     for event in integrator.follow_equations(equations, start, specs, backward=not rising):
@@ -228,13 +228,13 @@ def _slow_orbit_grows_to_instability_norm(
             scene, steady_state, beyond, integrator, with_inertia=with_inertia
         )
         if (
-            orbit.reached_instability_norm
+            orbit.has_reached_instability_norm
             and len(orbit.log_slip_rate_peaks) == 1
             and leap > _MIN_LEAP_FACTOR
         ):
             leap = math.sqrt(leap)
         elif orbit.point_where_growth_was_too_slow is None:
-            return orbit.reached_instability_norm
+            return orbit.has_reached_instability_norm
         else:
             start_point = orbit.point_where_growth_was_too_slow
 
@@ -251,7 +251,7 @@ def _follow_one_orbit(
 
     The integration also ends if the orbit grows too slowly to decide the outcome.
     """
-    norm = scene.log_instability_rate
+    norm = scene.log_slip_rate_at_instability
     levels = build_events_testing_monotone_rise(scene)
     if levels and not steady_state.is_stable:
         levels = []
@@ -271,33 +271,33 @@ def _follow_one_orbit(
                 at_start = top
                 if top >= norm:
                     return _OrbitOutcome(
-                        (), reached_instability_norm=True, initial_log_slip_rate=top
+                        (), has_reached_instability_norm=True, initial_log_slip_rate=top
                     )
             elif top >= norm and not with_inertia:
-                return _OrbitOutcome((top,), reached_instability_norm=True)
+                return _OrbitOutcome((top,), has_reached_instability_norm=True)
         elif event.specification in levels:
             if is_slip_rate_rise_monotone(scene, event.point):
                 return _OrbitOutcome(
-                    tuple(peaks), reached_instability_norm=False, initial_log_slip_rate=at_start
+                    tuple(peaks), has_reached_instability_norm=False, initial_log_slip_rate=at_start
                 )
         elif event.kind is EventKind.RISE:
             return _OrbitOutcome(
-                (*peaks, norm + _ASSUMED_PEAK_HEIGHT_ABOVE_NORM), reached_instability_norm=True
+                (*peaks, norm + _ASSUMED_PEAK_HEIGHT_ABOVE_NORM), has_reached_instability_norm=True
             )
         elif event.kind is EventKind.SETTLED and steady_state.is_stable:
             return _OrbitOutcome(
-                tuple(peaks), reached_instability_norm=False, initial_log_slip_rate=at_start
+                tuple(peaks), has_reached_instability_norm=False, initial_log_slip_rate=at_start
             )
         elif event.kind is EventKind.MAXIMUM:
             peaks.append(top)
             if top >= norm:
-                return _OrbitOutcome(tuple(peaks), reached_instability_norm=True)
+                return _OrbitOutcome(tuple(peaks), has_reached_instability_norm=True)
             if not planar:
                 if repeating.is_repeating_at_peak(event.point):
-                    return _OrbitOutcome(tuple(peaks), reached_instability_norm=False)
+                    return _OrbitOutcome(tuple(peaks), has_reached_instability_norm=False)
                 continue
             if len(peaks) > 1 and _peaks_have_stopped_growing(peaks, steady_state, integrator):
-                return _OrbitOutcome(tuple(peaks), reached_instability_norm=False)
+                return _OrbitOutcome(tuple(peaks), has_reached_instability_norm=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
             if slow and not steady_state.is_stable and event.regime != Scene.RUPTURE_REGIME:
                 return _OrbitOutcome(tuple(peaks), False, event.point)

@@ -70,7 +70,7 @@ def compute_peak_log_rate_excess_over_norm(scene: Scene, integrator: Integrator)
         If the motion cannot continue. ``MotionStopped`` is not raised if slip stops.
     """
     norm, heavy, highest = (
-        scene.log_instability_rate,
+        scene.log_slip_rate_at_instability,
         is_slow_manifold_inaccurate(scene, integrator),
         -math.inf,
     )
@@ -145,7 +145,7 @@ def _slip_rate_stays_below_instability_norm(scene: Scene, motion_point: MotionPo
     if min(strengthening[i] for i in states) < 0.0:
         return False
     raised, least_shift = _compute_max_rate_rise_by_pore_pressure(scene, motion_point)
-    if motion_point.log_slip_rate + raised >= scene.log_instability_rate:
+    if motion_point.log_slip_rate + raised >= scene.log_slip_rate_at_instability:
         return False
     fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_OVER_SPRING_UNLOADING)
     for distance in _LOG_RATE_DECREASES_FOR_WEAKENING_TEST:

@@ -224,7 +224,7 @@ def find_steady_sliding_and_stability_margin(scene: Scene) -> SteadySlidingWithS
         If sliding cannot be steady at the load point velocity.
     """
     load = scene.log_load_velocity
-    sliding = scene.steady_sliding(load)
+    sliding = scene.compute_steady_sliding(load)
     if sliding is None:
         raise MotionStopped(
             Status.NO_STEADY_STATE,

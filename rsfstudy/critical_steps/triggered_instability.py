@@ -59,7 +59,7 @@ class Triggered(Measure):
 
     name: ClassVar[str] = "triggered"
     primary_output = "unstable"
-    typical_work = 800
+    typical_rhs_evaluations = 800
     outputs = (
         Output("unstable", "", "1", "1 if the step triggers instability, otherwise 0", error=True),
     )
@@ -81,7 +81,7 @@ class Triggered(Measure):
             Status, results and message.
         """
         check_loading_is_single_step(scene)
-        if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
+        if max(0.0, scene.log_load_velocity) >= scene.log_slip_rate_at_instability:
             return build_norm_below_load_velocity_outcome(scene, scene.load_velocity)
         if not scene.is_perturbed:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")

@@ -68,8 +68,8 @@ class SharedCellSettings:
     accuracy : Accuracy
         Accuracy of each cell.
     cell_cpu_time_limit : float, optional
-        CPU time in s that a cell may use on a worker. The default is ``CELL_TIME_LIMIT``. If cells
-        are computed in the process of the user, their CPU time is not limited.
+        CPU time in s that a cell may use on a worker. The default is ``CELL_CPU_TIME_LIMIT``. If
+        cells are computed in the process of the user, their CPU time is not limited.
     user_parts : tuple of UserPart, default: ()
         User-defined parts of the slider.
     user_stepper_classes : tuple of type, default: ()
@@ -84,7 +84,7 @@ class SharedCellSettings:
     base_scene: Scene
     measure: Measure
     accuracy: Accuracy
-    cell_cpu_time_limit: float = Defaults.CELL_TIME_LIMIT
+    cell_cpu_time_limit: float = Defaults.CELL_CPU_TIME_LIMIT
     user_parts: tuple[UserPart, ...] = ()
     user_stepper_classes: tuple[type, ...] = ()
     code_fingerprint: Mapping[str, str] = field(default_factory=dict)
@@ -280,7 +280,7 @@ def compute_packed_cell_batch(serialized_settings: bytes, packed_batch: bytes) -
         if ours
         else _cpu_time_limits.enforce_in_this_thread(cell_settings.cell_cpu_time_limit)
     ):
-        SceneFields.user_parts_registrar(cell_settings.user_parts)
+        SceneFields.register_user_parts(cell_settings.user_parts)
         Engine.register_user_steppers(cell_settings.user_stepper_classes)
         for key, *changes in pickle.loads(zlib.decompress(packed_batch)):
             cell = CellFieldChanges(*changes).build_cell(cell_settings.base_scene)

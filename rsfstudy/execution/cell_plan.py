@@ -55,7 +55,7 @@ def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
     bytes
         Key of 16 bytes.
     """
-    of_scene, of_measure = scene.stored_fields(), measure.plain_fields
+    of_scene, of_measure = scene.stored_fields(), measure.scalar_field_values
     for name in measure.fields_omitted_from_storage:
         del of_measure[name]
     values = (*of_scene.values(), *of_measure.values())

@@ -154,7 +154,7 @@ def collect_run_fingerprint(study: Study, example_scenes: Iterable[Scene]) -> di
         Fingerprint as plain data. The entry ``physics`` contains one code digest for each module
         that the measure and the parts of the scenes import directly or indirectly.
     """
-    plain, accuracy = study.measure.plain_fields, study.accuracy
+    plain, accuracy = study.measure.scalar_field_values, study.accuracy
     return {
         "study": f"{study.name} version {study.version}",
         "measure": {n: v for n, v in study.measure.describe().items() if n not in plain},

@@ -71,7 +71,7 @@ class WorkerPool(contextlib.ExitStack):
         Client of a Dask cluster. If a client is passed, the cells are computed on the cluster, and
         no local worker processes are started.
     cell_time_limit : float, optional
-        CPU time in s that a cell may use on a worker. The default is ``CELL_TIME_LIMIT``.
+        CPU time in s that a cell may use on a worker. The default is ``CELL_CPU_TIME_LIMIT``.
     log_path : Path, optional
         File to which the local worker processes write errors. If this argument is passed, all runs
         use this log file. By default, each run has its own log file.
@@ -86,7 +86,7 @@ class WorkerPool(contextlib.ExitStack):
         self,
         process_count: int = 2,
         dask_client: Any = None,
-        cell_time_limit: float = Defaults.CELL_TIME_LIMIT,
+        cell_time_limit: float = Defaults.CELL_CPU_TIME_LIMIT,
         log_path: Path | None = None,
     ) -> None:
         super().__init__()

@@ -42,7 +42,7 @@ class RecomputedCell:
         Number of the cell in row-major order.
     scene : Scene
         Scene of the cell.
-    outcome : Outcome
+    measure_outcome : Outcome
         Results of the measure.
     motion : xarray.Dataset
         Motion of the cell.
@@ -54,7 +54,7 @@ class RecomputedCell:
 
     cell_number: int
     scene: Scene
-    outcome: Outcome
+    measure_outcome: Outcome
     motion: xr.Dataset
     motion_explanation: str
     motion_python_code: str
@@ -186,7 +186,7 @@ def tabulate_recomputed_outcome(
         ``stored``.
     """
     stored = results.sel(find_cell_coordinates(results, recomputed_cell.cell_number))
-    values = {n: v for n, v in recomputed_cell.outcome.values.items() if np.ndim(v) == 0}
+    values = {n: v for n, v in recomputed_cell.measure_outcome.values.items() if np.ndim(v) == 0}
     rows = [
         {
             "result": name,

@@ -61,7 +61,7 @@ class MapData:
     ----------
     x, y : ndarray
         Coordinates of the cells along both axes, in increasing order.
-    values, status_codes : ndarray, shape (y, x)
+    cell_values, status_codes : ndarray, shape (y, x)
         Values and status codes of the cells.
     cell_numbers : ndarray of int, shape (y, x)
         Numbers of the cells in row-major order, or -1 if a point belongs to no cell.
@@ -69,7 +69,7 @@ class MapData:
 
     x: np.ndarray
     y: np.ndarray
-    values: np.ndarray
+    cell_values: np.ndarray
     status_codes: np.ndarray
     cell_numbers: np.ndarray
 
@@ -305,7 +305,7 @@ def sample_map_at_pixels(
         pixels = low + (high - low) * (np.arange(count) + 0.5) / count
         pixels = np.exp(pixels) if is_log else pixels
         places.append(np.clip(np.searchsorted(edges, pixels, "right") - 1, 0, points.size - 1))
-    return map_data.values[np.ix_(*places)]
+    return map_data.cell_values[np.ix_(*places)]
 
 
 class CellStatusMarks(NamedTuple):

@@ -404,7 +404,7 @@ def _convert_map_to_image(map_data: MapData) -> tuple[np.ndarray, list[tuple[flo
 
     If all cells have the same size on the axes, each pixel of the image is one cell.
     """
-    limits, is_even = [], map_data.values.size <= _MAX_CELLS_OF_IMAGE
+    limits, is_even = [], map_data.cell_values.size <= _MAX_CELLS_OF_IMAGE
     for points in (map_data.x, map_data.y):
         is_log = are_log_spaced(points)
         edges = compute_cell_edges(points, is_log)
@@ -412,7 +412,7 @@ def _convert_map_to_image(map_data: MapData) -> tuple[np.ndarray, list[tuple[flo
         is_even = is_even and bool(np.ptp(sizes) < 1e-6 * sizes[0])
         limits.append((float(edges[0]), float(edges[-1])))
     return (
-        map_data.values
+        map_data.cell_values
         if is_even
         else sample_map_at_pixels(map_data, limits[0], limits[1], _PIXELS)
     ), limits

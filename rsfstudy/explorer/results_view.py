@@ -318,7 +318,7 @@ class ResultsView(ExplorerView):
 
     def _show_recomputed_cell(self, recomputed_cell: RecomputedCell) -> None:
         """Show the scene, the outcome and the motion of a cell."""
-        self.cell = recomputed_cell
+        self.cell, outcome = recomputed_cell, recomputed_cell.measure_outcome
         fields = _create_text_pane(format_fields_except_none(recomputed_cell.scene.as_dict()))
         table = pn.pane.DataFrame(
             tabulate_recomputed_outcome(recomputed_cell, self.results),
@@ -333,8 +333,8 @@ class ResultsView(ExplorerView):
             *self._cell_area[:2],
             pn.Card(fields, title="Scene", collapsed=True, **_STRETCH_WIDTH_OPTIONS),
             _create_text_pane(
-                f"Computed again: {format_status_name(int(recomputed_cell.outcome.status))}, "
-                f"{recomputed_cell.outcome.rhs_evaluations:,} right-hand-side evaluations"
+                f"Computed again: {format_status_name(int(outcome.status))}, "
+                f"{outcome.rhs_evaluations:,} right-hand-side evaluations"
             ),
             table,
             pn.Column(*figures, styles=_SIDE_BY_SIDE_GRID_STYLE, **_STRETCH_WIDTH_OPTIONS),

@@ -98,7 +98,7 @@ class SceneControls:
         )  # fmt: skip
         units.param.watch(lambda event: self._convert_settings_to_units(event.new), "value")
         cards = [self._create_card("rig", self._create_rig_widgets())] if self._rig else []
-        slider_fields = SceneFields.list_names_of_part(SliderParameters)
+        slider_fields = SceneFields.list_part_field_names(SliderParameters)
         cards.append(
             self._create_card(
                 "slider", self._create_field_widgets(SliderParameters, slider_fields[:4])
@@ -146,18 +146,20 @@ class SceneControls:
         classes.pop(PROTOCOL_LOADING_NAME, None)
         old = classes.get(self.find_name_of_selected_part(part_slot))
         new = classes.get(part_name)
-        kept = set(SceneFields.list_names_of_part(new)) if new else set()
-        dropped = set(SceneFields.list_names_of_part(old)) - kept if old else set()
+        kept = set(SceneFields.list_part_field_names(new)) if new else set()
+        dropped = set(SceneFields.list_part_field_names(old)) - kept if old else set()
         dropped |= {find_dimensional_field_name(field) for field in dropped}
         fields = {n: v for n, v in self.settings.scene.items() if n not in dropped}
         if not part_slot.part_class_by_selecting_field:
             fields[part_slot.name] = part_name
         elif (
             new is not None
-            and new.selecting_field_name
+            and new.field_name_that_selects_part
             and (self._rig is None or part_slot.name == "loading")
         ):
-            fields[new.selecting_field_name] = self._find_typical_value(new.selecting_field_name)
+            fields[new.field_name_that_selects_part] = self._find_typical_value(
+                new.field_name_that_selects_part
+            )
         rig = dict(self.settings.rig)
         for quantity in _EXTRA_RIG_QUANTITIES_BY_PART.get(old.name, ()) if old else ():
             rig.pop(quantity, None)
@@ -222,7 +224,7 @@ class SceneControls:
         if name == PROTOCOL_LOADING_NAME:
             return [*widgets, self._create_protocol_text_box()]
         part = {**part_slot.built_in_parts, **part_slot.user_parts}[name]
-        return widgets + self._create_field_widgets(part, SceneFields.list_names_of_part(part))
+        return widgets + self._create_field_widgets(part, SceneFields.list_part_field_names(part))
 
     def _create_field_widgets(self, part: Any, field_names: tuple[str, ...]) -> list[Any]:
         """Return the widgets of the fields of a part that apply to the scene."""
@@ -301,7 +303,7 @@ class SceneControls:
             float(number),
             limits,
             change,
-            Rig.QUANTITIES[quantity_name].meaning,
+            Rig.QUANTITIES[quantity_name].description,
         ).row
 
     def _create_protocol_text_box(self) -> Any:

@@ -204,7 +204,7 @@ class Fit(Measure):
     machine_stiffness: float = 0.0
     stiffness_relative_stderr: float = 0.0
     name: ClassVar[str] = "fit"
-    typical_work = 250_000
+    typical_rhs_evaluations = 250_000
     dimensions = (
         Quantity("parameter", "", "", "fitted parameter"),
         Quantity("other_parameter", "", "", "fitted parameter"),
@@ -302,7 +302,7 @@ class Fit(Measure):
         return (*super().quantities, *draws)
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the parameters, and indices of the rows and draws."""
         names = np.array(self.parameters, dtype=object)
         together = sum(map(len, self._first_output_row_by_record))
@@ -637,6 +637,6 @@ class Fit(Measure):
             whole = [record.columns[name] for record in self._first_output_row_by_record]
             along[f"record_{name}"] = np.concatenate(whole)
         for name, column in along.items():
-            values[name] = along_rows = np.full(len(self.inner_coordinates["row"]), math.nan)
+            values[name] = along_rows = np.full(len(self.output_coordinates["row"]), math.nan)
             along_rows[slice(len(column)) if name.startswith("record_") else rows] = column
         return values

@@ -87,15 +87,15 @@ class LockedPortion(NamedTuple):
 
     Parameters
     ----------
-    kind : str
+    portion_kind : str
         Kind of portion: "reloading", "unloading" or "initial loading".
-    time, displacement, friction : ndarray, shape (rows,)
+    time, load_point_displacement, friction : ndarray, shape (rows,)
         Times in s, load point displacements in um since the beginning of the portion, and friction.
     """
 
-    kind: str
+    portion_kind: str
     time: np.ndarray
-    displacement: np.ndarray
+    load_point_displacement: np.ndarray
     friction: np.ndarray
 
 
@@ -138,7 +138,7 @@ def measure_stiffness(
             begins, ends = portion.time[[0, -1]].tolist()
             inside = (time >= begins) & (time <= ends)
             stress = math.nan if normal_stress is None else float(normal_stress[inside].mean())
-            rows.append((portion.kind, begins, ends, value - 0.5 * trend, stderr, stress))
+            rows.append((portion.portion_kind, begins, ends, value - 0.5 * trend, stderr, stress))
     if any(row[0] != INITIAL_LOADING for row in rows):
         rows = [row for row in rows if row[0] != INITIAL_LOADING]
     by_trend = 0.5 * math.hypot(trend, trend_stderr)
@@ -278,9 +278,9 @@ def _remove_rows_after_slip_onset(portion: LockedPortion) -> LockedPortion | Non
     count = len(portion.time)
     if count < _MIN_ROWS_OF_LOCKED_PORTION:
         return None
-    x = np.abs(portion.displacement - portion.displacement[0])
+    x = np.abs(portion.load_point_displacement - portion.load_point_displacement[0])
     y = portion.friction - portion.friction[0]
-    y = -y if portion.kind == UNLOADING else y
+    y = -y if portion.portion_kind == UNLOADING else y
     half = max(int(np.argmax(y >= 0.5 * y.max())), 1)
     width = max(
         int(np.argmax(y >= _SLOPE_WINDOW_FRICTION_CHANGE_FRACTION * y.max())),
@@ -298,15 +298,16 @@ def _remove_rows_after_slip_onset(portion: LockedPortion) -> LockedPortion | Non
     sd = math.sqrt(noise_variance(portion.time, y))
     if not steepest > _MIN_SLOPE_SIGMAS * sd / math.sqrt(float(squares.mean())):
         return None
-    low = slopes < _MIN_SLOPE_OVER_LARGEST_SLOPE_BY_KIND[portion.kind] * steepest
+    low = slopes < _MIN_SLOPE_OVER_LARGEST_SLOPE_BY_KIND[portion.portion_kind] * steepest
     last = int(np.argmax(low)) + width // 2 if low.any() else count
     if last < _MIN_ROWS_OF_LOCKED_PORTION or (
-        portion.kind == INITIAL_LOADING and y[last - 1] < _MIN_FRICTION_RISE_OF_INITIAL_LOADING
+        portion.portion_kind == INITIAL_LOADING
+        and y[last - 1] < _MIN_FRICTION_RISE_OF_INITIAL_LOADING
     ):
         return None
     every = -(-last // _MAX_ROWS_OF_LOCKED_PORTION)
     rows = slice(0, last, every)
-    return LockedPortion(portion.kind, *(of[rows] for of in portion[1:]))
+    return LockedPortion(portion.portion_kind, *(of[rows] for of in portion[1:]))
 
 
 def fit_stiffness(portion: LockedPortion) -> tuple[float, float]:
@@ -324,9 +325,9 @@ def fit_stiffness(portion: LockedPortion) -> tuple[float, float]:
     stderr : float
         Standard error of the stiffness.
     """
-    time, x, y = portion.time, portion.displacement, portion.friction
+    time, x, y = portion.time, portion.load_point_displacement, portion.friction
     slope, level = np.polyfit(x, y, 1)
-    unloads = portion.kind == UNLOADING
+    unloads = portion.portion_kind == UNLOADING
     rate = 0.0 if unloads else math.log(0.3)
     first = np.array([level, math.log(max(slope, 1e-12)), rate, _PRIOR_OF_LOG_A[0], 0.0])
     bounds = np.array(

@@ -156,19 +156,19 @@ class EventStatistics(Measure):
         *_iterate_moment_outputs(),
     )
     #: Smallest number of intervals, below which the moments have no meaning.
-    MIN_CYCLES: ClassVar[int] = 4
+    MIN_CYCLE_COUNT: ClassVar[int] = 4
 
     @property
-    def typical_work(self) -> int:
+    def typical_rhs_evaluations(self) -> int:
         """Typical number of right-hand-side evaluations per cell."""
         return 2_000 * (self.cycles + self.discarded_cycles + 4 * self.checked_cycles)
 
     def __post_init__(self) -> None:
         """Check the fields of the measure."""
         for name, least in (
-            ("cycles", self.MIN_CYCLES),
+            ("cycles", self.MIN_CYCLE_COUNT),
             ("discarded_cycles", 0),
-            ("checked_cycles", self.MIN_CYCLES),
+            ("checked_cycles", self.MIN_CYCLE_COUNT),
         ):
             value = getattr(self, name)
             if isinstance(value, bool) or not value >= least or value % 1:

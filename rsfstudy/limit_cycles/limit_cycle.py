@@ -187,9 +187,9 @@ class LimitCycle(RecordingMeasure):
     events: int = 300
     name: ClassVar[str] = "limit_cycle"
     #: Values of ``slip_mode``, in the order of their codes.
-    SLIP_MODES: ClassVar = SLIP_MODE_NAMES
+    SLIP_MODE_NAMES: ClassVar = SLIP_MODE_NAMES
     primary_output = "recurrence_interval"
-    typical_work = 9_000
+    typical_rhs_evaluations = 9_000
     outputs = _LIMIT_CYCLE_OUTPUTS
 
     def __post_init__(self) -> None:
@@ -256,14 +256,14 @@ class LimitCycle(RecordingMeasure):
         )
         if motion is None:
             return build_outcome_of_settling_motion(scene)
-        if motion.approached_periodic_orbit is None:
+        if motion.attracting_periodic_orbit is None:
             return build_outcome_of_aperiodic_motion(
                 scene, motion, suggest_raising_event_limit(self.events)
             )
         return self._refine_known_periodic_orbit(
             scene,
             integrator,
-            motion.approached_periodic_orbit.orbit_starting_at_largest_event,
+            motion.attracting_periodic_orbit.orbit_starting_at_largest_event,
             len(motion.cycles),
         )
 
@@ -314,7 +314,7 @@ class LimitCycle(RecordingMeasure):
         values["work_per_cycle"] = one.rhs_evaluation_count / one.period_in_cycles
         status, why = determine_status_from_output_errors(integrator, one, errors)
         why = why or _describe_several_events_per_period(one)
-        path = extract_recorded_rows_of_cycles(scene, again.cycles, again.recording)
+        path = extract_recorded_rows_of_cycles(scene, again.cycles, again.motion_recorder)
         return Outcome(
             status,
             values | resample_motion_along_path(path, self.phases, engine=integrator.engine),
@@ -367,7 +367,7 @@ def build_outcome_of_settling_motion(scene: Scene) -> Outcome:
 def _classify_slip_mode(scene: Scene, peak_log_slip_rate: float) -> float:
     """Return the slip mode code of a cycle with a given peak of ln V."""
     damping = scene.parts.dynamics.radiated_stress_slope(0.0)
-    limit = math.log(scene.a / damping) if damping else scene.log_instability_rate
+    limit = math.log(scene.a / damping) if damping else scene.log_slip_rate_at_instability
     return _STICK_SLIP_CODE if peak_log_slip_rate >= limit else _SLOW_SLIP_CODE
 
 
@@ -493,9 +493,9 @@ def _compute_additional_cycle_outputs(scene: Scene, cycle: StickSlipCycle) -> di
         "healing_exponent": _compute_healing_exponent(scene, cycle),
         "residual_friction": cycle.friction_coefficient_at_peak_rate,
         "drop_asymmetry": (
-            cycle.max_spring_stress_deviation - cycle.spring_stress_deviation_at_peak_rate
+            cycle.max_spring_stress_minus_steady - cycle.peak_rate_spring_stress_minus_steady
         )
-        / (cycle.spring_stress_deviation_at_peak_rate - cycle.min_spring_stress_deviation),
+        / (cycle.peak_rate_spring_stress_minus_steady - cycle.min_spring_stress_minus_steady),
     }
 
 

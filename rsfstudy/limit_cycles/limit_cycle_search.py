@@ -322,14 +322,14 @@ class StickSlipSequence:
     ----------
     cycles : list of StickSlipCycle
         Cycles of the motion. In the results of ``LimitCycle``, a cycle is called an event.
-    approached_periodic_orbit : PeriodicOrbit or None
+    attracting_periodic_orbit : PeriodicOrbit or None
         Periodic orbit that the motion approaches, or None if no orbit was found.
     may_still_converge : bool
         True if the motion may still approach a periodic orbit.
     """
 
     cycles: list[StickSlipCycle]
-    approached_periodic_orbit: PeriodicOrbit | None
+    attracting_periodic_orbit: PeriodicOrbit | None
     may_still_converge: bool
 
 

@@ -85,7 +85,7 @@ class PeriodicOrbit:
         Accuracy with which the cycles were computed.
     rhs_evaluation_count : int
         Number of right-hand-side evaluations.
-    recording : MotionRecorder, optional
+    motion_recorder : MotionRecorder, optional
         Recording along the cycles. The recording may extend beyond the end of the cycles.
     """
 
@@ -94,7 +94,7 @@ class PeriodicOrbit:
     offset_to_closed_orbit: np.ndarray
     integration_accuracy: Accuracy
     rhs_evaluation_count: int
-    recording: MotionRecorder | None = None
+    motion_recorder: MotionRecorder | None = None
 
     @property
     def period_in_cycles(self) -> int:
@@ -102,7 +102,7 @@ class PeriodicOrbit:
         return len(self.cycles)
 
     @property
-    def start_section_coordinates(self) -> np.ndarray:
+    def start_point_on_poincare_section(self) -> np.ndarray:
         """Section at which the closed orbit begins."""
         return np.asarray(
             extract_section_coordinates(self.cycles[0].motion_point_at_start)
@@ -489,11 +489,11 @@ class ReturnMap:
             return None
         cycle_count = self._count_cycles_until_repeat(found.cycles, scale)
         if (
-            np.abs(found.start_section_coordinates - start_section).max()
+            np.abs(found.start_point_on_poincare_section - start_section).max()
             > self.integrator.result_tolerance(10.0) * scale
         ):
             slopes = self.compute_return_map_derivatives_per_cycle(
-                found.start_section_coordinates, cycle_count, scale
+                found.start_point_on_poincare_section, cycle_count, scale
             )
         if len(slopes) < cycle_count:
             return None
@@ -519,7 +519,7 @@ class ReturnMap:
         if orbit.integration_accuracy == self.integrator.accuracy:
             return orbit
         return self._solve_for_closed_orbit(
-            orbit.start_section_coordinates,
+            orbit.start_point_on_poincare_section,
             orbit.return_map_derivatives_per_cycle,
             self.scene.a * orbit.cycles[0].log_slip_rate_range,
             _MAX_ORBIT_DISTANCE,

@@ -58,11 +58,11 @@ class StickSlipCycle(NamedTuple):
     ----------
     recurrence_interval : float
         Time from the first to the second maximum of spring stress.
-    max_spring_stress_deviation : float
+    max_spring_stress_minus_steady : float
         Deviation of spring stress from steady sliding at V_*, at the second maximum.
-    min_spring_stress_deviation : float
+    min_spring_stress_minus_steady : float
         Deviation of spring stress at its minimum.
-    spring_stress_deviation_at_peak_rate : float
+    peak_rate_spring_stress_minus_steady : float
         Deviation of spring stress at the peak slip rate.
     friction_coefficient_at_peak_rate : float
         Friction coefficient at the peak slip rate.
@@ -83,9 +83,9 @@ class StickSlipCycle(NamedTuple):
     """
 
     recurrence_interval: float
-    max_spring_stress_deviation: float
-    min_spring_stress_deviation: float
-    spring_stress_deviation_at_peak_rate: float
+    max_spring_stress_minus_steady: float
+    min_spring_stress_minus_steady: float
+    peak_rate_spring_stress_minus_steady: float
     friction_coefficient_at_peak_rate: float
     min_log_slip_rate: float
     max_log_slip_rate: float
@@ -115,8 +115,8 @@ class StickSlipCycle(NamedTuple):
         """
         highest = self.motion_point_at_start.spring_stress
         drops = (
-            highest - self.min_spring_stress_deviation,
-            highest - self.spring_stress_deviation_at_peak_rate,
+            highest - self.min_spring_stress_minus_steady,
+            highest - self.peak_rate_spring_stress_minus_steady,
         )
         return (
             self.recurrence_interval,
@@ -278,9 +278,9 @@ def _build_cycle_from_events(
     fastest, rested = max(points, key=_get_log_slip_rate), min(points, key=_get_log_slip_rate)
     return StickSlipCycle(
         recurrence_interval=end.time - start_time,
-        max_spring_stress_deviation=end.point.spring_stress,
-        min_spring_stress_deviation=min(map(_get_spring_stress, points)),
-        spring_stress_deviation_at_peak_rate=fastest.spring_stress,
+        max_spring_stress_minus_steady=end.point.spring_stress,
+        min_spring_stress_minus_steady=min(map(_get_spring_stress, points)),
+        peak_rate_spring_stress_minus_steady=fastest.spring_stress,
         friction_coefficient_at_peak_rate=fastest.friction_coefficient,
         min_log_slip_rate=rested.log_slip_rate,
         max_log_slip_rate=fastest.log_slip_rate,

@@ -22,13 +22,13 @@ PlainValue = int | float | str | bool
 
 
 def check_declared_cost_estimates(
-    typical_work: object, expected_work: Callable[[Accuracy], float]
+    typical_rhs_evaluations: object, expected_work: Callable[[Accuracy], float]
 ) -> None:
     """Check that the typical and the expected work are positive numbers.
 
     Parameters
     ----------
-    typical_work : object
+    typical_rhs_evaluations : object
         Typical number of right-hand-side evaluations.
     expected_work : callable
         Function that returns the expected number of evaluations at an accuracy.
@@ -38,8 +38,13 @@ def check_declared_cost_estimates(
     InvalidValue
         If a number is not positive and finite.
     """
-    if not isinstance(typical_work, int | float) or not 0 < typical_work < np.inf:
-        raise InvalidValue("typical_work", typical_work, "must be a number greater than 0")
+    if (
+        not isinstance(typical_rhs_evaluations, int | float)
+        or not 0 < typical_rhs_evaluations < np.inf
+    ):
+        raise InvalidValue(
+            "typical_rhs_evaluations", typical_rhs_evaluations, "must be a number greater than 0"
+        )
     for tolerance in (Accuracy.MIN_RTOL, Accuracy.DEFAULT_RTOL, Accuracy.MAX_RTOL):
         expected = expected_work(Accuracy(tolerance))
         if not 0 < expected < np.inf:

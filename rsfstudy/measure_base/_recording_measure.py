@@ -58,10 +58,10 @@ class RecordingMeasure(Measure):
     @property
     def recorded_point_count(self) -> int:
         """Number of record points that are stored."""
-        return int(self.plain_fields["phases"])
+        return int(self.scalar_field_values["phases"])
 
     @cached_attribute
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Coordinate values of ``phase``, from 0 to 1."""
         return {"phase": np.linspace(0.0, 1.0, self.recorded_point_count)}
 

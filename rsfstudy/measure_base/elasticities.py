@@ -211,7 +211,7 @@ class Elasticities(Measure):
         )
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Parameter names, which are the coordinate values of ``parameter``."""
         return {"parameter": np.array(self.parameters, dtype=object)}
 
@@ -221,16 +221,16 @@ class Elasticities(Measure):
         return self.measure.solved_fields
 
     @property
-    def typical_work(self) -> int:
+    def typical_rhs_evaluations(self) -> int:
         """Typical number of right-hand-side evaluations per cell."""
-        return self.measure.typical_work * (
+        return self.measure.typical_rhs_evaluations * (
             4 * min(_TYPICAL_PARAMETER_COUNT, len(self.parameters)) + 1
         )
 
     @property
-    def work_by_digits(self) -> Mapping[float, float]:
+    def relative_cost_by_digits(self) -> Mapping[float, float]:
         """Relative cost of the inner measure for each requested number of digits."""
-        return self.measure.work_by_digits
+        return self.measure.relative_cost_by_digits
 
     def describe(self) -> dict[str, Any]:
         """Return the definition of the measure as plain data.

@@ -101,7 +101,7 @@ class Measure(ConstructorKeywordCheckMixin):
         name: ClassVar[str]                       # name of the measure
         primary_output: str                       # name of the main result
         outputs: Sequence[Output]                 # results, with units and error estimates
-        typical_work: int                         # right-hand-side evaluations per cell
+        typical_rhs_evaluations: int                         # right-hand-side evaluations per cell
         compute(self, scene, integrator) -> Outcome
 
     The method ``compute`` returns ``Outcome(status, values)``. The mapping ``values`` contains one
@@ -134,7 +134,7 @@ class Measure(ConstructorKeywordCheckMixin):
     ...     name = "rate_weakening"
     ...     primary_output = "b_minus_a"
     ...     outputs = (Output("b_minus_a", "$b-a$", "1", "rate weakening"),)
-    ...     typical_work = 1
+    ...     typical_rhs_evaluations = 1
     ...
     ...     def compute(self, scene, integrator):
     ...         return Outcome(Status.OK, {"b_minus_a": scene.b - scene.a})
@@ -180,7 +180,7 @@ class Measure(ConstructorKeywordCheckMixin):
         return {name: about.dims for about in self.outputs for name in about.variable_names}
 
     @cached_attribute
-    def optional_outputs(self) -> Sequence[str]:
+    def optional_output_names(self) -> Sequence[str]:
         """Names of the results that may be missing from a successful outcome.
 
         If an optional result is missing, the message of the outcome contains the reason.
@@ -188,13 +188,13 @@ class Measure(ConstructorKeywordCheckMixin):
         return tuple(about.name for about in self.outputs if about.optional)
 
     @cached_attribute
-    def outputs_with_error(self) -> tuple[str, ...]:
+    def names_of_outputs_with_error(self) -> tuple[str, ...]:
         """Names of the results that have an error estimate."""
         names = self.variables
         return tuple(name for name in names if f"{name}_error" in names)
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Coordinate values of the inner dimensions, by dimension."""
         return {}
 
@@ -227,15 +227,15 @@ class Measure(ConstructorKeywordCheckMixin):
         )
 
     @property
-    def typical_work(self) -> int:
+    def typical_rhs_evaluations(self) -> int:
         """Typical number of right-hand-side evaluations per cell.
 
         The number applies to the default accuracy.
         """
-        raise TypeError(f"{type(self).__name__} does not define typical_work")
+        raise TypeError(f"{type(self).__name__} does not define typical_rhs_evaluations")
 
     @property
-    def work_by_digits(self) -> Mapping[float, float]:
+    def relative_cost_by_digits(self) -> Mapping[float, float]:
         """Relative cost of the computation, by requested number of digits.
 
         The number of digits is ``-log10(rtol)``, and the work is relative to the work at the
@@ -257,10 +257,12 @@ class Measure(ConstructorKeywordCheckMixin):
         float
             The typical number of evaluations, scaled to the accuracy.
         """
-        return self.typical_work * compute_relative_cost_at_accuracy(accuracy, self.work_by_digits)
+        return self.typical_rhs_evaluations * compute_relative_cost_at_accuracy(
+            accuracy, self.relative_cost_by_digits
+        )
 
     @property
-    def plain_fields(self) -> dict[str, PlainValue]:
+    def scalar_field_values(self) -> dict[str, PlainValue]:
         """Fields that hold a number, a flag or a string, by name.
 
         Only these fields may vary along an axis.
@@ -297,7 +299,7 @@ class Measure(ConstructorKeywordCheckMixin):
         """
         if not changes:
             return self
-        present, annotated = self.plain_fields, {f.name: f.type for f in fields(self)}
+        present, annotated = self.scalar_field_values, {f.name: f.type for f in fields(self)}
         for name, value in changes.items():
             if name not in present:
                 rule = f"is not a number, flag or string field of the measure {self.name}"
@@ -377,9 +379,11 @@ class Measure(ConstructorKeywordCheckMixin):
                     )
                     raise InvalidValue(f"measure {self.name!r}", ..., rule, remedy=remedy)
             _check_names_declared_by_measure(self)
-            for name, values in self.inner_coordinates.items():
+            for name, values in self.output_coordinates.items():
                 _declaration_checks.check_coordinate_values(name, values)
-            _declaration_checks.check_declared_cost_estimates(self.typical_work, self.expected_work)
+            _declaration_checks.check_declared_cost_estimates(
+                self.typical_rhs_evaluations, self.expected_work
+            )
             _declaration_checks.check_measure_description(self.name, self.describe)
         except InvalidValue:
             raise
@@ -488,7 +492,7 @@ class Measure(ConstructorKeywordCheckMixin):
                 outcome,
                 "has the status pending, but must have the status of a computed cell",
             )
-        declared, inner = self.variables, self.inner_coordinates
+        declared, inner = self.variables, self.output_coordinates
         given = outcome.values.items()
         values = {
             # The full check is slow and is not necessary for plain floats, the most common results.
@@ -511,8 +515,8 @@ class Measure(ConstructorKeywordCheckMixin):
         """
         known = [
             n
-            for n in self.outputs_with_error
-            if n in output_values or n not in self.optional_outputs
+            for n in self.names_of_outputs_with_error
+            if n in output_values or n not in self.optional_output_names
         ]
         for name in (self.primary_output, *known, *(f"{name}_error" for name in known)):
             value = output_values.get(name, math.nan)
@@ -580,7 +584,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
     """
     stated = [name for about in measure.outputs for name in about.variable_names]
     variables = measure.variables
-    names = [*(stated or variables), *measure.inner_coordinates]
+    names = [*(stated or variables), *measure.output_coordinates]
     if not variables:
         raise InvalidValue(
             "variables", {}, "must contain at least one numeric output"
@@ -612,13 +616,13 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
                 "dimensions", dims, "must be a tuple of unique names", remedy=remedy
             ).with_location(f"output {name!r}")
         for dim in dims:
-            if dim not in measure.inner_coordinates:
+            if dim not in measure.output_coordinates:
                 raise InvalidValue(
                     "dimension",
                     dim,
                     f"of the output {name!r} has no coordinate values",
                 )
-    known = {*names, *measure.plain_fields}
+    known = {*names, *measure.scalar_field_values}
     for about in measure.quantities:
         if not isinstance(about, Quantity) or about.name not in known:
             odd = about.name if isinstance(about, Quantity) else about
@@ -633,7 +637,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
 
 
 def compute_relative_cost_at_accuracy(
-    accuracy: Accuracy, work_by_digits: Mapping[float, float]
+    accuracy: Accuracy, relative_cost_by_digits: Mapping[float, float]
 ) -> float:
     """Return the cost at a requested accuracy, relative to the default accuracy.
 
@@ -643,7 +647,7 @@ def compute_relative_cost_at_accuracy(
     ----------
     accuracy : Accuracy
         Accuracy of the cells.
-    work_by_digits : mapping of float to float
+    relative_cost_by_digits : mapping of float to float
         Relative cost by number of digits ``-log10(rtol)``.
 
     Returns
@@ -651,10 +655,10 @@ def compute_relative_cost_at_accuracy(
     float
         Cost at ``accuracy`` divided by the cost at the default accuracy.
     """
-    known = sorted(work_by_digits)
+    known = sorted(relative_cost_by_digits)
     digits = min(accuracy.digits, known[-1] + 2.0)
     above = next((d for d in known[1:] if d >= digits), known[-1])
     below = known[known.index(above) - 1]
     share = (digits - below) / (above - below)
-    low, high = work_by_digits[below], work_by_digits[above]
+    low, high = relative_cost_by_digits[below], relative_cost_by_digits[above]
     return float(low * (high / low) ** share)

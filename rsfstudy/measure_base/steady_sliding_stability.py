@@ -26,7 +26,7 @@ def is_steady_sliding_linearly_stable(scene: Scene) -> bool:
         With the status ``no_steady_state`` if steady sliding does not exist, and with the status
         ``unverified`` if the largest growth rate is zero within its error.
     """
-    growth = scene.segment_scene(-1).largest_linear_growth_rate(scene.log_load_velocity)
+    growth = scene.segment_scene(-1).compute_largest_linear_growth_rate(scene.log_load_velocity)
     if growth is None:
         text = f"no steady state exists at V_0/V_* = {scene.load_velocity:.3g}"
         raise MotionStopped(Status.NO_STEADY_STATE, text)

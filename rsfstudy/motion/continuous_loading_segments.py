@@ -251,5 +251,5 @@ def _is_steady_sliding_unstable(scene: Scene) -> bool:
     """Return True if steady sliding is unstable in the last loading segment."""
     if scene.log_load_velocity == -math.inf:
         return False
-    growth = scene.segment_scene(-1).largest_linear_growth_rate(scene.log_load_velocity)
+    growth = scene.segment_scene(-1).compute_largest_linear_growth_rate(scene.log_load_velocity)
     return growth is not None and growth.is_positive

@@ -23,7 +23,7 @@ _POINT_COLUMN_BY_QUANTITY = {
 } | {"": 0}
 #: Kinds of events that are reported without a request. The negative event codes are indices from
 #: the end of this list.
-_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
+_KINDS_AND_SPECS_OF_AUTOMATIC_EVENTS = [
     (k, None)
     for k in (
         EventKind.SEGMENT_START,
@@ -95,7 +95,7 @@ def pack_event_specifications_into_table(
     """
     meanings = [
         *((spec.kind, spec) for spec in event_specs),
-        *_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS,
+        *_KINDS_AND_SPECS_OF_AUTOMATIC_EVENTS,
     ]
     asked = np.zeros((len(event_specs), len(array_layout.EVENT_SPECIFICATION_COLUMNS)))
     for row, spec in zip(asked, event_specs, strict=True):

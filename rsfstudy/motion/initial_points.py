@@ -50,7 +50,7 @@ def compute_initial_point(scene: Scene) -> MotionPoint:
     if scene.starts_unsteady:
         psis, log_slip_rate = _find_specified_initial_states(scene, psis)
     psis = _reset_loading_unknowns(scene, psis)
-    stress = scene.parts.slider.initial_stress + scene.spring_stress_step
+    stress = scene.parts.slider_parameters.initial_stress + scene.spring_stress_step
     stepped = build_point_without_derived_values(scene, stress, psis)
     return (
         compute_point_with_slip_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
@@ -74,7 +74,7 @@ def compute_point_before_start(scene: Scene) -> MotionPoint:
     psis = before.compute_steady_states(0.0, 0.0)
     if scene.starts_unsteady:
         psis = _find_specified_initial_states(scene, psis)[0]
-    return before.compute_slow_manifold_point(scene.parts.slider.initial_stress, psis)
+    return before.compute_slow_manifold_point(scene.parts.slider_parameters.initial_stress, psis)
 
 
 def build_point_without_derived_values(
@@ -256,7 +256,7 @@ def check_forward_slip_is_possible_at_start(
         If normal stress vanishes. The exception is also raised if shear stress changes sign, unless
         the friction law is regularised and the load point moves.
     """
-    slider = scene.parts.slider
+    slider = scene.parts.slider_parameters
     begins = slider.initial_stress + scene.spring_stress_step
     spring_stress = begins if start_point is None else start_point.spring_stress
     lost = spring_stress <= scene.parts.normal_stress.compute_frictional_stress_lower_bound(scene)

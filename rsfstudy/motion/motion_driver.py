@@ -60,7 +60,7 @@ _MODE_AND_TABLES_WITHOUT_RECORDING = (
 )
 #: Index of the segment table in the arguments of the loop that follow the motion state.
 _ARGUMENT_INDEX_OF_LATER_SEGMENTS = 5
-_NO_LATER_SEGMENTS_AND_ZERO_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
+_DEFAULT_LATER_SEGMENTS_AND_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
 class MotionDriver:
@@ -137,7 +137,7 @@ class MotionDriver:
         recording: MotionRecorder | None = None,
         later_segments_and_reported_count: tuple[
             np.ndarray, int
-        ] = _NO_LATER_SEGMENTS_AND_ZERO_COUNT,
+        ] = _DEFAULT_LATER_SEGMENTS_AND_COUNT,
         initial_imposed_stress: float | None = None,
         noise_segment_tables: Iterator[np.ndarray] | None = None,
     ) -> Iterator[Event]:

@@ -65,14 +65,14 @@ class MotionRecorder:
     MOTION_VARIABLE_NAMES: ClassVar = MOTION_VARIABLE_NAMES
     RECORDED_VARIABLE_NAMES: ClassVar = RECORDED_VARIABLE_NAMES
     #: Columns after the recorded variables.
-    REGIME_COLUMN: ClassVar = REGIME_COLUMN
-    SAMPLE_NUMBER_COLUMN: ClassVar = SAMPLE_NUMBER_COLUMN
-    FIRST_STATE_COLUMN: ClassVar = FIRST_STATE_COLUMN
+    REGIME_COLUMN_INDEX: ClassVar = REGIME_COLUMN
+    SAMPLE_NUMBER_COLUMN_INDEX: ClassVar = SAMPLE_NUMBER_COLUMN
+    FIRST_STATE_COLUMN_INDEX: ClassVar = FIRST_STATE_COLUMN
 
     regime_names: list[str] = field(default_factory=list)
     sample_times: np.ndarray | None = None
     _row_blocks: list[np.ndarray] = field(default_factory=list)
-    _block_count_with_capped_times: int = 0
+    _time_capped_block_count: int = 0
 
     def get_or_add_regime_index(self, regime_name: str) -> int:
         """Return the index of a regime, and add new regimes to the list.
@@ -131,11 +131,11 @@ class MotionRecorder:
         """
         if self.sample_times is not None:
             return
-        for rows in self._row_blocks[self._block_count_with_capped_times :]:
+        for rows in self._row_blocks[self._time_capped_block_count :]:
             np.minimum(rows[:, 0], end_time, out=rows[:, 0])
-        if self._block_count_with_capped_times < len(self._row_blocks):
+        if self._time_capped_block_count < len(self._row_blocks):
             self._row_blocks[-1][-1:, 0] = end_time
-        self._block_count_with_capped_times = len(self._row_blocks)
+        self._time_capped_block_count = len(self._row_blocks)
 
     def as_table(self, scene: Scene, end_event: Event | None = None) -> np.ndarray:
         """Return the recorded motion as a table.

@@ -54,7 +54,7 @@ def choose_figure_and_build_panels(
     dataset : xarray.Dataset
         Dataset with the axes that the figure expects.
     """
-    name, sizes = StoredDataset(dataset).declaration.plot, dataset["status"].sizes
+    name, sizes = StoredDataset(dataset).study_declaration.plot, dataset["status"].sizes
     study = load_study(name) if name in list_study_names() else None
     if name == _NAME_OF_FITS_FIGURE and variable == "posterior" and variable in dataset:
         from rsfstudy.plots import corner_plots
@@ -79,7 +79,7 @@ def choose_figure_and_build_panels(
             known = set(study.dimensions)
     elif isinstance(requested_figure, Declared):
         known -= (
-            set(StoredDataset(dataset).declaration.overrides)
+            set(StoredDataset(dataset).study_declaration.overrides)
             - requested_figure.used_dimension_names
         )
     varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
@@ -125,7 +125,7 @@ def _repeat_panels_for_facets_and_extra_axes(
     named = [panel.y for panel in figure_declaration.panels if isinstance(panel.y, str) and panel.y]
     if not found and named and not any(name in dataset for name in named):
         rule = "does not fit these results, because the results do not contain its variables"
-        raise InvalidValue("plot", StoredDataset(dataset).declaration.plot, rule)
+        raise InvalidValue("plot", StoredDataset(dataset).study_declaration.plot, rule)
     return found
 
 

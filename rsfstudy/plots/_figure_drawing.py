@@ -202,7 +202,7 @@ def _find_row_index_of_panel(axes: Axes) -> int:
 
 def _add_header_with_notes(figure: Figure, dataset: xr.Dataset) -> None:
     """Add a header that lists overridden settings, and missing and failed cells."""
-    overrides = StoredDataset(dataset).declaration.overrides
+    overrides = StoredDataset(dataset).study_declaration.overrides
     missing, is_warning = _format_note_on_missing_cells(dataset)
     lines = (
         [_format_note_on_overrides(dataset, compute_max_header_line_characters(figure))]
@@ -233,10 +233,11 @@ def _format_note_on_overrides(dataset: xr.Dataset, max_line_characters: int) -> 
     own = read_quantities_not_in_vocabulary(dataset)
     names = {
         n: find_quantity_symbol_or_name(find_quantity(n, own))
-        for n in StoredDataset(dataset).declaration.overrides
+        for n in StoredDataset(dataset).study_declaration.overrides
     }
     values = {
-        names[name]: value for name, value in StoredDataset(dataset).declaration.overrides.items()
+        names[name]: value
+        for name, value in StoredDataset(dataset).study_declaration.overrides.items()
     }
     text = convert_symbols_to_mathtext(
         format_overrides(values).replace("=", " = ").replace(",", ", ").replace(",  ", ", ")
@@ -324,5 +325,5 @@ def save_figure(
         raise
     except Exception as error:
         rule = f"does not fit these results ({type(error).__name__}: {error})"
-        raise InvalidValue("plot", StoredDataset(dataset).declaration.plot, rule) from error
+        raise InvalidValue("plot", StoredDataset(dataset).study_declaration.plot, rule) from error
     write_image(image, path)

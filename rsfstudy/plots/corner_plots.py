@@ -213,7 +213,7 @@ def _write_note_on_omitted_variables(
 def _list_sampled_fields_by_dimension(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Return the field names of each axis with numbered points, by dimension."""
     found: dict[str, list[str]] = {}
-    for axis in (stored.build_axis() for stored in StoredDataset(dataset).declaration.axes):
+    for axis in (stored.build_axis() for stored in StoredDataset(dataset).study_declaration.axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
             found[axis.dimension] = [name for name in axis.fields if name in dataset.coords]
     return found

@@ -72,7 +72,7 @@ def build_line_panels(dataset: xr.Dataset, variable: str | None = None) -> Seque
             or read_flag_meanings_of_variable(dataset[variable])
         )
         names = [variable] if drawn else []
-    named = len(names) == 1 and not StoredDataset(dataset).declaration.overrides
+    named = len(names) == 1 and not StoredDataset(dataset).study_declaration.overrides
     return [
         _build_line_panel(dataset, name, dataset.attrs.get("title", "") if named else "")
         for name in names

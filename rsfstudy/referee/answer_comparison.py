@@ -69,9 +69,9 @@ class QuantityAgreement:
     agreeing_digits : float
         Smallest number of correct digits in any row. The number cannot exceed the number of digits
         of the known answer.
-    least_agreeing_row : int
+    least_agreeing_row_index : int
         Index of the row with the largest relative difference from the known answer.
-    first_failing_row : int or None
+    first_failing_row_index : int or None
         Index of the first row with fewer correct digits than required, or None if all rows have
         enough correct digits.
     agrees_within_rounding_error : bool
@@ -82,8 +82,8 @@ class QuantityAgreement:
 
     quantity_name: str
     agreeing_digits: float
-    least_agreeing_row: int
-    first_failing_row: int | None
+    least_agreeing_row_index: int
+    first_failing_row_index: int | None
     agrees_within_rounding_error: bool
     relative_differences: np.ndarray
 
@@ -143,15 +143,13 @@ class AnswerComparison:
             elif agreement.agreeing_digits == problem.digits:
                 text += ", all known digits"
             elif problem.answer_index_column_name:
-                text += (
-                    ", lowest agreement at "
-                    f"{_format_time_or_peak_number_of_row(problem, agreement.least_agreeing_row)}"
-                )
-            if agreement.first_failing_row is not None and problem.answer_index_column_name:
-                text += (
-                    "; fewer digits than required from "
-                    f"{_format_time_or_peak_number_of_row(problem, agreement.first_failing_row)}"
-                )
+                row_index = agreement.least_agreeing_row_index
+                text += ", lowest agreement at "
+                text += _format_time_or_peak_number_of_row(problem, row_index)
+            if agreement.first_failing_row_index is not None and problem.answer_index_column_name:
+                row_index = agreement.first_failing_row_index
+                text += "; fewer digits than required from "
+                text += _format_time_or_peak_number_of_row(problem, row_index)
             lines.append(text)
         return lines
 
@@ -245,7 +243,9 @@ def compare_answers(
     of the known answer.
     """
     values = {name: column.si_values for name, column in reported_quantities.items()}
-    places = {name: column.last_place_unit_in_si for name, column in reported_quantities.items()}
+    places = {
+        name: column.si_value_of_last_decimal_place for name, column in reported_quantities.items()
+    }
     found = AnswerComparison(
         problem,
         _compare_quantities(problem, values, known_answer, required_digits, places),

@@ -40,13 +40,13 @@ class ReportedQuantity(NamedTuple):
     ----------
     si_values : ndarray, shape (n,)
         Values in SI units.
-    last_place_unit_in_si : float
+    si_value_of_last_decimal_place : float
         One unit in the last decimal place of the values, in SI units. The attribute is 0 if all
         values are zero, or if the quantity was computed from another quantity.
     """
 
     si_values: np.ndarray
-    last_place_unit_in_si: float
+    si_value_of_last_decimal_place: float
 
 
 def read_external_answer(
@@ -170,11 +170,11 @@ def _convert_column_to_si(
         )
         raise InvalidValue(
             quantity_name, column.units, "has no units", remedy=remedy
-        ).with_location(column.path)
+        ).with_location(column.file_path)
     try:
         factor = convert_to_si(quantity_name, 1.0 if one == "1" else one, units)
     except InvalidValue as error:
-        raise error.with_location(column.path) from error
+        raise error.with_location(column.file_path) from error
     most = (
         math.log10(_MAX_ACCEPTED_ANSWER_VALUE_IN_SI)
         if quantity_name == "log10_slip_rate"

@@ -91,7 +91,10 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
     seen = recording.as_table(scene)
     told = dict(zip(MotionRecorder.MOTION_VARIABLE_NAMES, seen.T, strict=False))
     sigma, b = rig.normal_stress, np.array(problem.b_values)
-    states = seen[:, MotionRecorder.FIRST_STATE_COLUMN : MotionRecorder.FIRST_STATE_COLUMN + len(b)]
+    states = seen[
+        :,
+        MotionRecorder.FIRST_STATE_COLUMN_INDEX : MotionRecorder.FIRST_STATE_COLUMN_INDEX + len(b),
+    ]
     taken = states.sum(axis=1) - told["state_variable"]
     states = states - np.outer(taken, np.abs(b) / np.abs(b).sum())
     thetas = (np.array(problem.steady_thetas_at_reference_velocity) * np.exp(states / b)).T

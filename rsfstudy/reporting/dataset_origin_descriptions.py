@@ -82,14 +82,14 @@ def find_constant_scene_and_rig_fields(
     rig : dict of str to float
         Quantities of the rig in SI units. The dictionary is empty if the study has no rig.
     """
-    declared = StoredDataset(dataset).declaration
+    declared = StoredDataset(dataset).study_declaration
     varied = {
-        str(n).removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX)
+        str(n).removeprefix(DatasetUnits.DIMENSIONLESS_FIELD_NAME_PREFIX)
         for n, along in dataset.coords.items()
         if along.dims
     } | list_scene_fields_set_by_fit(dataset)
     scene = {n: v for n, v in declared.base.items() if n not in varied}
-    rig = declared.laboratory or {}
+    rig = declared.rig_quantities or {}
     return scene, {name: rig[name] for name in Rig.convert_quantities_for_display(rig, varied)}
 
 
@@ -136,7 +136,7 @@ def format_note_on_low_instability_norms(dataset: xr.Dataset) -> str:
         velocity, and with the message of the first of these results. The string is empty if there
         is no such result, or if the study has no rig.
     """
-    if StoredDataset(dataset).declaration.laboratory is None:
+    if StoredDataset(dataset).study_declaration.rig_quantities is None:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
     near = [text for text in ok.tolist() if text.startswith(CriticalStep.SLOW_NORM_WARNING_PREFIX)]

@@ -60,7 +60,7 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     for one in split_into_single_fits(dataset):
         where = ", ".join(f"{n} {value}" for n, value in find_record_and_step_of_fit(one).items())
         places.setdefault(where, []).append(one)
-    measure: Any = StoredDataset(dataset).declaration.measure
+    measure: Any = StoredDataset(dataset).study_declaration.measure
     together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
     several, unfitted = len(places) > 1, []
     for where, fits in places.items():

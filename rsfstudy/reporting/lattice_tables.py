@@ -89,7 +89,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
 
 def _find_fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
     """Return the fields that vary along numbered axes, such as samples."""
-    axes = [axis.values for axis in StoredDataset(dataset).declaration.axes]
+    axes = [axis.values for axis in StoredDataset(dataset).study_declaration.axes]
     columns = [
         v for v in axes if isinstance(v, Mapping) and isinstance(next(iter(v.values())), list)
     ]

@@ -113,7 +113,7 @@ def list_names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:
     list of str
         Names in the order of the declaration.
     """
-    named = [reduction["name"] for reduction in StoredDataset(dataset).declaration.reductions]
+    named = [reduction["name"] for reduction in StoredDataset(dataset).study_declaration.reductions]
     return [name for name in named if {name, f"{name}_stderr"} <= set(dataset.data_vars)]
 
 
@@ -168,7 +168,9 @@ def find_reasons_of_refused_reductions(dataset: xr.Dataset) -> dict[str, str]:
     dict of str to str
         Reasons by reduction name.
     """
-    named = [str(reduction["name"]) for reduction in StoredDataset(dataset).declaration.reductions]
+    named = [
+        str(reduction["name"]) for reduction in StoredDataset(dataset).study_declaration.reductions
+    ]
     # The name of one reduction may begin with the name of another reduction.
     named.sort(key=len, reverse=True)
     found: dict[str, str] = {}
@@ -239,7 +241,7 @@ def find_reasons_of_missing_reductions(dataset: xr.Dataset) -> dict[str, str]:
         Reasons by reduction name.
     """
     found, there = find_reasons_of_refused_reductions(dataset), tuple(map(str, dataset.data_vars))
-    for stated_as in StoredDataset(dataset).declaration.reductions:
+    for stated_as in StoredDataset(dataset).study_declaration.reductions:
         about: Mapping[str, Any] = {**stated_as}
         if not any(name.startswith(about["name"]) for name in there):
             least, most = map(format_number_or_text, about.get("within") or ("", ""))

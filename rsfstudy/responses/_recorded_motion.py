@@ -151,7 +151,7 @@ def record_motion_until_peak(
     shown = rows[:, 0] >= begun[first_segment_index].time
     rows, neglected = rows[shown], neglected[shown]
     # The other samples of the step that ends at the first row are not part of the record.
-    rows[0, MotionRecorder.SAMPLE_NUMBER_COLUMN] = 0.0
+    rows[0, MotionRecorder.SAMPLE_NUMBER_COLUMN_INDEX] = 0.0
     friction, later = (
         MotionRecorder.get_friction_coefficient(rows),
         begun[max(first_segment_index, 1) :],
@@ -301,7 +301,7 @@ def compute_settled_friction_flag(scene: Scene, *, is_friction_constant: bool) -
     """
     if not is_friction_constant:
         return 0.0
-    growth = scene.largest_linear_growth_rate(scene.log_load_velocity)
+    growth = scene.compute_largest_linear_growth_rate(scene.log_load_velocity)
     if growth is not None and growth.is_zero_within_error:
         return math.nan
     return 0.0 if growth is not None and growth.is_positive else 1.0

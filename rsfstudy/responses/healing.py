@@ -131,7 +131,7 @@ class Healing(RecordingMeasure):
     phases: int = 300
     name: ClassVar[str] = "healing"
     primary_output = "healing"
-    typical_work = 4_000
+    typical_rhs_evaluations = 4_000
     outputs = _HEALING_OUTPUTS
 
     def __post_init__(self) -> None:

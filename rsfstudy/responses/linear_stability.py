@@ -123,7 +123,7 @@ class LinearStability(Measure):
     growth_rate: bool = False
     fields_stored_unless_default: ClassVar[tuple[str, ...]] = ("growth_rate",)
     name: ClassVar[str] = "linear_stability"
-    typical_work = 100
+    typical_rhs_evaluations = 100
     needs_time: ClassVar[tuple[bool, ...]] = ()
 
     @property
@@ -174,7 +174,7 @@ class LinearStability(Measure):
         load = scene.log_load_velocity
         if load == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
-        steady = scene.steady_sliding(load)
+        steady = scene.compute_steady_sliding(load)
         if steady is None:
             return Outcome(
                 Status.NO_STEADY_STATE,
@@ -272,7 +272,9 @@ def _find_stiffness_at_zero_growth(
     # If the scene has several states, sliding may be stable again below the next smaller critical
     # stiffness.
     before = [
-        k for k in scene.all_critical_stiffnesses(steady_state.log_slip_rate) if k < stiffness_guess
+        k
+        for k in scene.compute_all_critical_stiffnesses(steady_state.log_slip_rate)
+        if k < stiffness_guess
     ]
     softer = max(0.5 * stiffness_guess, math.sqrt(stiffness_guess * before[-1]) if before else 0.0)
     if not growth_at(softer) > 0.0 > growth_at(2.0 * stiffness_guess):

@@ -127,7 +127,7 @@ def add_growth_rate(
         else 2.0
     )
     difference = float(abs(found - leading).min())
-    rounding = scene.largest_linear_growth_rate(load)
+    rounding = scene.compute_largest_linear_growth_rate(load)
     error = difference + (rounding.error_estimate if rounding else math.inf)
     rate = math.exp(load)
     values = {

@@ -121,7 +121,7 @@ class RigidResponse(Measure):
     points: int = 201
     name: ClassVar[str] = "rigid_response"
     primary_output = "evolution_distance"
-    typical_work = 800
+    typical_rhs_evaluations = 800
     outputs = _RIGID_RESPONSE_OUTPUTS
     needs_time: ClassVar[tuple[bool, ...]] = ()
 
@@ -133,7 +133,7 @@ class RigidResponse(Measure):
             raise InvalidValue("points", self.points, "must be at least 2")
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Slip at the points of the response, in units of D_c."""
         return {"slip": np.linspace(0.0, self.slip, self.points)}
 
@@ -186,7 +186,7 @@ class RigidResponse(Measure):
                 Status.NO_STEADY_STATE,
                 message="the load point is held, so the slider does not slip",
             )
-        sliding = scene.steady_sliding(log_slip_rate)
+        sliding = scene.compute_steady_sliding(log_slip_rate)
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
         start, steady = (
@@ -202,7 +202,7 @@ class RigidResponse(Measure):
         )
         # Derivative of the distance with respect to friction, for an exponential decay.
         by_friction = math.e * distance / (start - steady)
-        slip = self.inner_coordinates["slip"]
+        slip = self.output_coordinates["slip"]
         exponential = steady + (start - steady) * np.exp(-slip)
         departs = (rows[:, 0] - exponential) / (start - steady)
         return Outcome(
@@ -244,7 +244,7 @@ class RigidResponse(Measure):
         rows : ndarray, shape (points, 3)
             Stress, state variable and normal stress ratio at the points.
         """
-        at, distance = self.inner_coordinates["slip"], math.nan
+        at, distance = self.output_coordinates["slip"], math.nan
         recording = MotionRecorder(sample_times=np.union1d(at, [1.0]))
         equations = scene.equations_at_imposed_slip_rate(scene.log_load_velocity)
         watches = (
@@ -283,9 +283,11 @@ def _compute_misfit_to_closed_form(
     """
     law, parts = scene.parts.law, scene.parts
     stress_acts = parts.normal_stress.effects or parts.fluid.effects or law.depends_on_stress
-    if stress_acts or parts.temperature.unknowns or law.relaxation is None:
+    if stress_acts or parts.temperature.unknowns or law.state_relaxation_function is None:
         return math.nan
-    left = np.array([law.relaxation(scene.log_load_velocity, at) for at in slip.tolist()])
+    left = np.array(
+        [law.state_relaxation_function(scene.log_load_velocity, at) for at in slip.tolist()]
+    )
     exact = steady_stress + (1.0 + scene.imposed_normal_stress) * scene.b * left
     return float(np.abs(stress - exact).max())
 
@@ -298,7 +300,9 @@ def _compute_step_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, f
     direct effect and of the evolution to steady sliding. If sliding cannot be steady after one of
     the two steps, the dictionary is empty.
     """
-    steady, inverse_steady = (scene.steady_sliding(x) for x in (log_slip_rate, -log_slip_rate))
+    steady, inverse_steady = (
+        scene.compute_steady_sliding(x) for x in (log_slip_rate, -log_slip_rate)
+    )
     if steady is None or inverse_steady is None:
         return {}
     direct, inverse = (

@@ -112,7 +112,7 @@ class StepResponse(RecordingMeasure):
     phases: int = 2000
     name: ClassVar[str] = "step_response"
     primary_output = "max_log10_slip_rate"
-    typical_work = 10_000
+    typical_rhs_evaluations = 10_000
     outputs = _STEP_RESPONSE_OUTPUTS
     dimensions = (Quantity("peak", "", "1", "number of the peak of slip rate after the step"),)
 
@@ -123,9 +123,9 @@ class StepResponse(RecordingMeasure):
             raise InvalidValue("peaks", self.peaks, "must be at least 2")
 
     @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+    def output_coordinates(self) -> Mapping[str, np.ndarray]:
         """Coordinate values of the peaks (numbers from 1) and of ``phase``."""
-        return {"peak": np.arange(1, self.peaks + 1), **super().inner_coordinates}
+        return {"peak": np.arange(1, self.peaks + 1), **super().output_coordinates}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the highest peak.

@@ -196,7 +196,7 @@ class VelocityStep(RecordingMeasure):
     phases: int = 400
     name: ClassVar[str] = "velocity_step"
     primary_output = "apparent_a_minus_b"
-    typical_work = 8_000
+    typical_rhs_evaluations = 8_000
     outputs = _VELOCITY_STEP_OUTPUTS
 
     def __post_init__(self) -> None:
@@ -242,7 +242,7 @@ class VelocityStep(RecordingMeasure):
         evolved = values["apparent_b"] * log_velocity_ratio
         over_friction = math.e / evolved if evolved else math.nan
         return {
-            **dict.fromkeys(self.outputs_with_error, 1.0),
+            **dict.fromkeys(self.names_of_outputs_with_error, 1.0),
             **dict.fromkeys(
                 ("apparent_a", "apparent_b", "apparent_a_minus_b"), 1.0 / log_velocity_ratio
             ),
@@ -426,7 +426,7 @@ def _compute_max_departure_from_closed_form(
     Only friction after its extremum is compared with the friction of a rigid slider. The result is
     NaN if there is no closed form.
     """
-    relaxation = scene.parts.law.relaxation
+    relaxation = scene.parts.law.state_relaxation_function
     if (
         relaxation is None
         or recorded_motion.peak_event is None

@@ -71,7 +71,7 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
         return Axis(dimension, values)
     if hasattr(values, "keys"):
         if isinstance(values, Mapping) and any(
-            isinstance(Axis.point_fields_getter(point), Mapping) for point in values.values()
+            isinstance(Axis.get_fields_of_point(point), Mapping) for point in values.values()
         ):
             return convert_axis_values_to_axis_units(Axis(dimension, values))
         units_by_name: Any = units or None
@@ -187,7 +187,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
         number, written = (
             split_number_and_units(value)
             if isinstance(value, str)
-            else (Axis.plain_value_converter(quantity_name, value), units)
+            else (Axis.convert_to_plain_value(quantity_name, value), units)
         )
         if isinstance(number, float) and written == units:
             found.append(number)

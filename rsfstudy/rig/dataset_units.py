@@ -27,7 +27,7 @@ class DatasetUnits:
         dataset_unit_scales.DISPLAY_UNITS_OF_STRESS_LENGTH_TIME
     )
     #: Prefix of the name of a dimensionless field if an axis in physical units has the same name.
-    DIMENSIONLESS_PREFIX: ClassVar[str] = dataset_unit_scales.DIMENSIONLESS_PREFIX
+    DIMENSIONLESS_FIELD_NAME_PREFIX: ClassVar[str] = dataset_unit_scales.DIMENSIONLESS_PREFIX
 
     convert_to_dimensional_variable_name = staticmethod(
         dataset_unit_scales.convert_to_dimensional_variable_name

@@ -17,7 +17,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.exception_conversion import raise_only_rsfstudy_errors
 from rsfstudy.rig.column_reading import RecordReadingOptions, read_columns
 from rsfstudy.rig.record_column_detection import AcceptedRecordColumns
-from rsfstudy.rig.rig import DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD, Rig
+from rsfstudy.rig.rig import SCALE_SYMBOL_BY_LOADING_SEGMENT_FIELD, Rig
 from rsfstudy.rig.table_columns import Column
 from rsfstudy.rig.table_files import read_table
 from rsfstudy.slider import (
@@ -295,7 +295,7 @@ def read_protocol(
         if key not in SEGMENT_MAPPING_KEYS:
             raise InvalidValue("column", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)
     units = {key: column.units for key, column in columns.items()}
-    of_slider = all(DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD[key] == of for key, of in units.items())
+    of_slider = all(SCALE_SYMBOL_BY_LOADING_SEGMENT_FIELD[key] == of for key, of in units.items())
     if not of_slider and rig is None:
         remedy = "Pass rig=, or use the dimensionless units V_*, D_c and D_c/V_*."
         rule = "require a rig"

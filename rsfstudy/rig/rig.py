@@ -48,7 +48,7 @@ from rsfstudy.slider import Protocol, Scene, SceneFields, protocol
 __getattr__ = build_getattr_for_former_names(__name__)
 
 #: Dimensionless units of the fields of a loading segment.
-DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD = {
+SCALE_SYMBOL_BY_LOADING_SEGMENT_FIELD = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
 }  # fmt: skip
@@ -192,7 +192,7 @@ class Rig(HtmlTableMixin):
         """
         for name, value in self.as_dict().items():
             about = RIG_QUANTITIES[name]
-            yield Quantity(name, about.symbol, about.si_units, about.meaning), value
+            yield Quantity(name, about.symbol, about.si_units, about.description), value
 
     @property
     def si_scale_by_dimensionless_unit(self) -> dict[str, UnitScale]:
@@ -242,7 +242,7 @@ class Rig(HtmlTableMixin):
         parts = [f"{name}='{value:.12g} {units}'" for name, (value, units) in shown.items()]
         return f"Rig({', '.join(parts)})"
 
-    @SceneFields.decorator_adding_fields_to_signature("b", *RATIO_FIELD_BY_DIMENSIONAL_NAME)
+    @SceneFields.add_fields_to_signature("b", *RATIO_FIELD_BY_DIMENSIONAL_NAME)
     def scene(self, **fields: Any) -> Scene:
         """Create a scene of this rig.
 
@@ -441,8 +441,8 @@ class Rig(HtmlTableMixin):
             return segment_fields  # A Segment is dimensionless.
         try:
             return {
-                key: self.dimensionless(value, DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD[key], key)
-                if key in DIMENSIONLESS_UNIT_BY_SEGMENT_FIELD
+                key: self.dimensionless(value, SCALE_SYMBOL_BY_LOADING_SEGMENT_FIELD[key], key)
+                if key in SCALE_SYMBOL_BY_LOADING_SEGMENT_FIELD
                 else value
                 for key, value in segment_fields.items()
             }

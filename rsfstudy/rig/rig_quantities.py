@@ -29,7 +29,7 @@ class RigQuantity(NamedTuple):
         Range of common values in SI units. Values outside this range cause a warning.
     symbol : str
         Symbol in LaTeX.
-    meaning : str
+    description : str
         Description of the quantity.
     """
 
@@ -37,7 +37,7 @@ class RigQuantity(NamedTuple):
     min_usual_value: float
     max_usual_value: float
     symbol: str
-    meaning: str
+    description: str
 
 
 RIG_QUANTITIES: Mapping[str, RigQuantity] = {

@@ -172,7 +172,7 @@ class Column(NamedTuple):
         Number of the column in the file, counted from 1.
     line_numbers : ndarray, optional
         Line number of each value in the file.
-    path : str, default: ""
+    file_path : str, default: ""
         Path of the file. The string is empty if the column does not come from a file.
     """
 
@@ -180,7 +180,7 @@ class Column(NamedTuple):
     units: str
     one_based_column_number: int = 0
     line_numbers: np.ndarray = np.empty(0, dtype=int)
-    path: str = ""
+    file_path: str = ""
 
     def format_location_of_row(self, row_index: int) -> str:
         """Return the location of a value for error messages.
@@ -195,10 +195,10 @@ class Column(NamedTuple):
         str
             File, line and column of the value, or the number of the sample.
         """
-        if not self.path:
+        if not self.file_path:
             return f"sample {row_index + 1}"
         return (
-            f"{self.path}, line {self.line_numbers[row_index]}, column "
+            f"{self.file_path}, line {self.line_numbers[row_index]}, column "
             f"{self.one_based_column_number}"
         )
 

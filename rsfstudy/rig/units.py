@@ -166,7 +166,7 @@ def convert_to_si_as_fraction(quantity_name: str, value: Any, si_units: str) -> 
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
         found = _convert_pint_quantity_to_si(quantity_name, value, value, si_units)
     else:
-        found = Axis.plain_value_converter(quantity_name, value)
+        found = Axis.convert_to_plain_value(quantity_name, value)
     if isinstance(found, bool) or not isinstance(found, int | float | Fraction):
         remedy = f"Pass a number in {si_units}, or a string with units."
         raise InvalidValue(quantity_name, value, "is not a quantity", remedy=remedy)
@@ -372,7 +372,7 @@ def _convert_pint_quantity_to_si(
         magnitude = pint_quantity.to(si_units).magnitude
     except Exception as error:
         raise _build_incompatible_units_error(quantity_name, value, si_units) from error
-    return Axis.plain_value_converter(quantity_name, magnitude)
+    return Axis.convert_to_plain_value(quantity_name, magnitude)
 
 
 def find_si_factor_and_exponents(units: str) -> SiFactorAndBaseUnitExponents | None:

@@ -202,7 +202,10 @@ def _list_state_names(scene: SceneView) -> tuple[str, ...]:
     count = scene.parts.law.state_count
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
     heat = scene.parts.temperature.unknowns
-    return (*of_law, *(unknown.name for unknown in (*heat, *scene.pressure_source.unknowns)))
+    return (
+        *of_law,
+        *(unknown.name for unknown in (*heat, *scene.part_changing_effective_stress.unknowns)),
+    )
 
 
 @cached_per_scene

@@ -123,7 +123,11 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         Friction functions of the scene. All scenes with the same combination of parts have the same
         functions.
     """
-    law, source, loading = scene.parts.law, scene.pressure_source, scene.stress_imposing_part
+    law, source, loading = (
+        scene.parts.law,
+        scene.part_changing_effective_stress,
+        scene.stress_imposing_part,
+    )
     oscillates, law_states = loading.adds_load_point_displacement_unknown, law.state_count
     boundary = -1 - len(scene.parts.fluid.unknowns) if loading.adds_normal_stress_unknowns else 0
     strength, effective, outer, derivatives = _build_functions_of_frictional_stress(

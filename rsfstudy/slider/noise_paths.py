@@ -44,14 +44,14 @@ class UnitNoisePath(NamedTuple):
     ----------
     seed : int
         Seed of the random numbers.
-    stream_number : int
+    random_stream_number : int
         Stream number. Paths with the same seed but different stream numbers are independent.
     correlation_time : float or None
         Correlation time :math:`t_c`, or None for a Wiener process.
     """
 
     seed: int
-    stream_number: int
+    random_stream_number: int
     correlation_time: float | None = None
 
     def compute_samples(
@@ -141,7 +141,7 @@ class UnitNoisePath(NamedTuple):
         """Return the normally distributed random numbers of a level."""
         skipped = first_index % _RANDOM_WORDS_PER_COUNTER_VALUE
         generator = np.random.Philox(
-            key=np.array([self.seed, self.stream_number], dtype=np.uint64),
+            key=np.array([self.seed, self.random_stream_number], dtype=np.uint64),
             counter=np.array(
                 [first_index // _RANDOM_WORDS_PER_COUNTER_VALUE, bisection_level, 0, 0],
                 dtype=np.uint64,

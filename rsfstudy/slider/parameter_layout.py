@@ -108,7 +108,7 @@ def pack_friction_parameter_values(scene: SceneView) -> FloatTuple:
         Parameters in the order defined by the constants of ``parameter_layout``. The elements that
         describe the spring and the load point are NaN.
     """
-    parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
+    parts, slider, law = scene.parts, scene.parts.slider_parameters, scene.parts.law
     size = slider.a * law.steady_state_change_per_log_rate_over_a
     size = math.copysign(size, law.b_over_a) if law.state_count == 1 else size
     of_load = math.nan, math.nan, math.nan
@@ -116,7 +116,9 @@ def pack_friction_parameter_values(scene: SceneView) -> FloatTuple:
     common = slider.a, size, slider.mu_star, *of_load, *of_stress
     own = (
         *_pad_part_parameters_with_nan(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
-        *_pad_part_parameters_with_nan(scene.pressure_source, scene, DYNAMICS - FLUID),
+        *_pad_part_parameters_with_nan(
+            scene.part_changing_effective_stress, scene, DYNAMICS - FLUID
+        ),
         *_pad_part_parameters_with_nan(parts.dynamics, scene, LAW - DYNAMICS),
     )
     last = collect_parameter_values(law, scene), pack_temperature_parameter_values(scene)

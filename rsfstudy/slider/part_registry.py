@@ -53,7 +53,7 @@ class PartSlot:
         Description of the slot.
     user_parts : dict of str to type or UserLoading, optional
         User-defined parts that have been used in this process, by name.
-    default_omitted_from_stored_scenes : bool, default: False
+    omits_default_from_stored_scenes : bool, default: False
         If True, the name of the default part is omitted from the keys of cells and from stored
         scenes. Use True for every slot that is added in a later version of rsfstudy, so that
         existing journals and files stay valid.
@@ -65,7 +65,7 @@ class PartSlot:
     default_part_name: str
     long_name: str
     user_parts: dict[str, UserPart] = field(default_factory=dict)
-    default_omitted_from_stored_scenes: bool = False
+    omits_default_from_stored_scenes: bool = False
 
     @property
     def quantity_of_selecting_field(self) -> Quantity:
@@ -76,9 +76,9 @@ class PartSlot:
     def part_class_by_selecting_field(self) -> Mapping[str, type[Part]]:
         """Mapping from field names to the parts that the fields select."""
         return {
-            part.selecting_field_name: part
+            part.field_name_that_selects_part: part
             for part in self.built_in_parts.values()
-            if part.selecting_field_name
+            if part.field_name_that_selects_part
         }
 
 
@@ -118,7 +118,7 @@ PART_SLOTS: tuple[PartSlot, ...] = (
         temperature.BUILT_IN_TEMPERATURE_CLASS_BY_NAME,
         "isothermal",
         "temperature of the fault",
-        default_omitted_from_stored_scenes=True,
+        omits_default_from_stored_scenes=True,
     ),
     PartSlot(
         "loading_noise",
@@ -126,7 +126,7 @@ PART_SLOTS: tuple[PartSlot, ...] = (
         noise.BUILT_IN_NOISE_CLASS_BY_NAME,
         "none",
         "noise that is added to the loading",
-        default_omitted_from_stored_scenes=True,
+        omits_default_from_stored_scenes=True,
     ),
 )
 #: Slots whose part is selected by name. In the other slots, the values of fields such as
@@ -157,7 +157,7 @@ DEFAULTS_OMITTED_FROM_STORED_SCENES: dict[str, Any] = {
     **{
         slot.name: slot.default_part_name
         for slot in PART_SLOTS
-        if slot.default_omitted_from_stored_scenes
+        if slot.omits_default_from_stored_scenes
     },
     **{
         name: part.__dataclass_fields__[name].default
@@ -539,7 +539,7 @@ def collect_python_types_of_scene_fields(user_parts: Iterable[UserPart]) -> Mapp
         for part in every:
             for name in list_part_field_names(part):
                 kind: Any = bool if is_boolean_field(part, name) else float
-                stated = name == part.selecting_field_name or all(
+                stated = name == part.field_name_that_selects_part or all(
                     name in list_part_field_names(one) for one in every
                 )
                 stated = stated and name not in DEFAULTS_OMITTED_FROM_STORED_SCENES

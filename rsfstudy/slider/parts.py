@@ -79,7 +79,7 @@ class Part:
     name: ClassVar[str]
     #: Name of the field whose value selects the part. The string is empty if the part is selected
     #: by its name.
-    selecting_field_name: ClassVar[str] = ""
+    field_name_that_selects_part: ClassVar[str] = ""
     #: Names of class members that are derived from the equations of the part, such as closed-form
     #: solutions.
     members_derived_from_equations: ClassVar[tuple[str, ...]] = ()
@@ -360,7 +360,7 @@ def list_part_field_names(part_class: type[Part]) -> tuple[str, ...]:
         the order must not change.
     """
     names = (f.name for f in fields(part_class) if "about" in f.metadata)
-    return tuple(sorted(names, key=lambda name: name != part_class.selecting_field_name))
+    return tuple(sorted(names, key=lambda name: name != part_class.field_name_that_selects_part))
 
 
 @cache

@@ -46,7 +46,7 @@ class SceneParts(NamedTuple):
 
     Parameters
     ----------
-    slider : SliderParameters
+    slider_parameters : SliderParameters
         Parameters that every slider has.
     law : LawBase
         State evolution law.
@@ -64,7 +64,7 @@ class SceneParts(NamedTuple):
         Noise that is added to the loading.
     """
 
-    slider: SliderParameters
+    slider_parameters: SliderParameters
     law: laws.LawBase
     normal_stress: normal_stress.NormalStress
     fluid: fluid.Fluid
@@ -160,7 +160,9 @@ def _group_values_by_part_index(
             if value is None or value is idle[name]:
                 continue
             owner = PART_CLASS_BY_FIELD_NAME[name]
-            if name != owner.selecting_field_name or validate_field_value(owner, name, value):
+            if name != owner.field_name_that_selects_part or validate_field_value(
+                owner, name, value
+            ):
                 raise field_lookup.rejecting_part_class_by_field[name].build_field_rejection_error(
                     name, value
                 )
@@ -268,7 +270,7 @@ def build_field_lookup(part_classes: tuple[type[Part], ...]) -> FieldLookup:
         for other in slot.built_in_parts.values():
             for name in set(list_part_field_names(other)) - set(places):
                 refusing[name] = part
-                calls = name == other.selecting_field_name
+                calls = name == other.field_name_that_selects_part
                 idle[name] = other.__dataclass_fields__[name].default if calls else None
                 if not calls or slot.name in owned:
                     foreign.add(name)

@@ -36,23 +36,23 @@ class SceneFunctions:
     equations_against_displacement = equations.build_equations_against_displacement
     equations_against_inertial_time = equations.build_equations_against_inertial_time
     compute_slow_manifold_point = equations.compute_slow_manifold_point
-    quasi_static_log_slip_rate = equations.compute_quasi_static_log_slip_rate
+    compute_quasi_static_log_slip_rate = equations.compute_quasi_static_log_slip_rate
 
     build_friction_relation = friction.build_friction_relation
     build_state_evolution_function = friction.build_state_evolution_function
     compute_steady_states = friction.compute_steady_states
     compute_effective_normal_stress = friction.compute_effective_normal_stress
 
-    steady_sliding = steady_state.compute_steady_sliding
+    compute_steady_sliding = steady_state.compute_steady_sliding
     steady_friction_minus_reference = steady_state.compute_steady_friction_minus_reference
     frictional_stress_from_strength = steady_state.compute_frictional_stress_from_strength
     frictional_stress_from_friction = steady_state.compute_frictional_stress_from_friction
-    min_steady_log_slip_rate = steady_state.find_min_steady_log_slip_rate
+    find_min_steady_log_slip_rate = steady_state.find_min_steady_log_slip_rate
 
     critical_stiffness_at = stability.compute_critical_stiffness
-    all_critical_stiffnesses = stability.compute_all_critical_stiffnesses
+    compute_all_critical_stiffnesses = stability.compute_all_critical_stiffnesses
     linear_growth_rates = stability.compute_linear_growth_rates
-    largest_linear_growth_rate = stability.compute_largest_linear_growth_rate
+    compute_largest_linear_growth_rate = stability.compute_largest_linear_growth_rate
 
     def __dir__(self) -> list[str]:
         """Return the public attributes, except for the methods of this class."""

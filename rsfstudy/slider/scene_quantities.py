@@ -57,7 +57,7 @@ class SceneQuantities(SceneBase):
         )
 
     @cached_attribute
-    def pressure_source(self) -> Fluid | Loading | Noise | FluidWithBoundaryPressure:
+    def part_changing_effective_stress(self) -> Fluid | Loading | Noise | FluidWithBoundaryPressure:
         """Part whose unknowns change the effective normal stress.
 
         If the loading has unknowns, the pressure source is the loading. Otherwise, the pressure
@@ -82,7 +82,7 @@ class SceneQuantities(SceneBase):
         the loading and of the fluid.
         """
         of_law, heat = self.parts.law.state_count, len(self.parts.temperature.unknowns)
-        return of_law + heat + len(self.pressure_source.unknowns)
+        return of_law + heat + len(self.part_changing_effective_stress.unknowns)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -92,23 +92,23 @@ class SceneQuantities(SceneBase):
     @cached_attribute
     def a(self) -> float:
         """Direct effect parameter."""
-        return self.parts.slider.a
+        return self.parts.slider_parameters.a
 
     @cached_attribute
     def b(self) -> float:
         """Evolution effect parameter, summed over all states of the law."""
-        return float(self.parts.slider.a * self.parts.law.b_over_a)
+        return float(self.parts.slider_parameters.a * self.parts.law.b_over_a)
 
     @property
     def stiffness(self) -> float:
         """Dimensionless stiffness K, in units of sigma_*/D_c."""
-        given = self.parts.slider.stiffness
+        given = self.parts.slider_parameters.stiffness
         return float(given) if given is not None else self._stiffness_from_ratio
 
     @cached_attribute
     def _stiffness_from_ratio(self) -> float:
         """Dimensionless stiffness, computed from the stiffness ratio."""
-        ratio = self.parts.slider.stiffness_ratio
+        ratio = self.parts.slider_parameters.stiffness_ratio
         assert ratio is not None  # The slider has either a stiffness or a stiffness ratio.
         if not 0.0 < self.critical_stiffness < math.inf:
             rule = (
@@ -134,7 +134,7 @@ class SceneQuantities(SceneBase):
         unstable only in a range of stiffness. In this case, a ratio below 1 does not imply that
         steady sliding is unstable.
         """
-        given = self.parts.slider.stiffness_ratio
+        given = self.parts.slider_parameters.stiffness_ratio
         if given is not None:
             return float(given)
         return self.stiffness / self.critical_stiffness if self.critical_stiffness else math.inf
@@ -174,7 +174,10 @@ class SceneQuantities(SceneBase):
     @property
     def starts_unsteady(self) -> bool:
         """True if the initial stress or state differs from steady sliding."""
-        return bool(self.parts.slider.initial_stress or self.parts.slider.initial_state)
+        return bool(
+            self.parts.slider_parameters.initial_stress
+            or self.parts.slider_parameters.initial_state
+        )
 
     @cached_attribute
     def inertial_time(self) -> float:
@@ -183,10 +186,10 @@ class SceneQuantities(SceneBase):
         The instability norm is a limit of the product of this time scale and the slip rate in units
         of :math:`V_*`. A motion is considered unstable if this product reaches the limit.
         """
-        slider = self.parts.slider
+        slider = self.parts.slider_parameters
         return slider.period * slider.reference_rate / (2.0 * math.pi)
 
     @cached_attribute
-    def log_instability_rate(self) -> float:
+    def log_slip_rate_at_instability(self) -> float:
         """Natural logarithm of V/V_* at which a motion is considered unstable."""
-        return math.log(self.parts.slider.instability_norm / self.inertial_time)
+        return math.log(self.parts.slider_parameters.instability_norm / self.inertial_time)

@@ -57,7 +57,7 @@ class SceneView(Protocol):
         """True if the loading or the noise changes normal stress."""
 
     @property
-    def pressure_source(self) -> Any:
+    def part_changing_effective_stress(self) -> Any:
         """Part with auxiliary unknowns: the fluid, the loading or a combination of both."""
 
     @property

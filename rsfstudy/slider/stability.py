@@ -342,7 +342,7 @@ def compute_spring_response_to_normal_stress(
         raise InvalidValue("temperature", name, "has no linear response", remedy=remedy)
     still = scene.steadily_loaded_scene
     steady = _compute_steady_sliding_or_raise(still, log_slip_rate)
-    psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))
+    psis = (*steady.states, *(0.0 for _unknown in scene.part_changing_effective_stress.unknowns))
     by_pressure, p = (
         scene.friction_law_functions.strength_derivatives_by_pressure,
         scene.friction_parameter_values,

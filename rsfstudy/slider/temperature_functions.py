@@ -85,7 +85,11 @@ def build_temperature_dependent_functions(
     dict of str to object
         Attributes of ``FrictionFunctions`` that replace the isothermal functions.
     """
-    parts, source, law_states = scene.parts, scene.pressure_source, scene.parts.law.state_count
+    parts, source, law_states = (
+        scene.parts,
+        scene.part_changing_effective_stress,
+        scene.parts.law.state_count,
+    )
     first = LAW + len(collect_parameter_values(parts.law, scene))
     end = first + len(pack_temperature_parameter_values(scene))
     places = _TemperatureIndices(-1 - len(source.unknowns), first, end)

@@ -44,7 +44,7 @@ class CellOutputPacker:
     """
 
     def __init__(self, measure: Measure) -> None:
-        sizes = {name: len(values) for name, values in measure.inner_coordinates.items()}
+        sizes = {name: len(values) for name, values in measure.output_coordinates.items()}
         self.shapes = {n: tuple(sizes[d] for d in dims) for n, dims in measure.variables.items()}
         stops = np.cumsum([math.prod(shape) for shape in self.shapes.values()])
         self.packed_number_count = int(stops[-1])

@@ -108,7 +108,7 @@ class LatticeCoordinatesBuilder:
         )
         for name, (dims, values) in scales.items():
             about = build_variable_attributes(
-                name.removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX), own
+                name.removeprefix(DatasetUnits.DIMENSIONLESS_FIELD_NAME_PREFIX), own
             )
             coords[name] = (dims, values, about)
         stored = [scene.stored_fields() for scene in scenes_by_cell_number.values()]
@@ -119,7 +119,7 @@ class LatticeCoordinatesBuilder:
                 about = build_variable_attributes(name, own, value)
                 coords[name] = ((), _convert_to_storable_array([value])[0], about)
         coords |= dict(_compute_derived_coordinates(coords))
-        for name, values in study.measure.inner_coordinates.items():
+        for name, values in study.measure.output_coordinates.items():
             coords[name] = (name, np.asarray(values), build_variable_attributes(name, own))
         return coords | stored_loadings.build_loading_variables(study.user_parts.values())
 
@@ -139,7 +139,7 @@ def _build_coordinates_along_axis(
     # The coordinate contains the values of the axis, even if the scenes of the first cells do not
     # use these values.
     points: list[AxisPointFieldValues] = [
-        {**study.measure.plain_fields, **fields, **row}
+        {**study.measure.scalar_field_values, **fields, **row}
         for fields, row in zip(scene_fields_of_points, axis.rows, strict=True)
     ]
     for name in axis.fields:

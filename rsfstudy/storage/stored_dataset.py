@@ -36,7 +36,7 @@ class StoredDataset:
         return schema.is_of_single_scene(self.dataset)
 
     @property
-    def declaration(self) -> StoredStudyDeclaration:
+    def study_declaration(self) -> StoredStudyDeclaration:
         """Declaration of the study."""
         return schema.read_study_declaration(self.dataset)
 

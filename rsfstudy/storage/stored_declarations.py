@@ -52,7 +52,7 @@ _DEFAULTS_OF_MISSING_SCENE_FIELDS: Mapping[str, Any] = {
     **{
         name: None
         for part in BUILT_IN_FLUID_CLASS_BY_NAME.values()
-        for name in SceneFields.list_names_of_part(part)
+        for name in SceneFields.list_part_field_names(part)
     },
     "fluid": "drained",
 }
@@ -71,7 +71,7 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         of values.
     units : mapping of str to str, optional
         Units of the fields.
-    drawn : mapping of str to object, optional
+    sampling_info : mapping of str to object, optional
         Description of the random sampling.
     """
 
@@ -81,7 +81,7 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         | Mapping[str, Mapping[str, float | str | bool | None] | Sequence[float | str | bool]]
     )
     units: Mapping[str, str] | None = None
-    drawn: Mapping[str, Any] | None = None
+    sampling_info: Mapping[str, Any] | None = msgspec.field(default=None, name="drawn")
 
     def build_axis(self, user_parts: Mapping[str, UserPart] = MappingProxyType({})) -> Axis:
         """Build the axis.
@@ -103,7 +103,7 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             If the description is invalid.
         """
         try:
-            named = Axis(self.dimension, self.values, self.units, self.drawn)
+            named = Axis(self.dimension, self.values, self.units, self.sampling_info)
         except InvalidValue as error:
             path = f"declaration.axes.{self.dimension}"
             raise build_invalid_entry_error(path, f"is invalid ({error})") from error
@@ -122,9 +122,9 @@ class _StoredMeasureDeclaration(msgspec.Struct):
 class _StoredReductionDeclaration(msgspec.Struct):
     """Entries required in every reduction declaration."""
 
-    kind: str
+    type_name_in_files: str = msgspec.field(name="kind")
     name: str
-    of: str
+    reduced_variable_name: str = msgspec.field(name="of")
 
 
 class StoredStudyDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -158,7 +158,7 @@ class StoredStudyDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=
         Literature references of the study.
     overrides : mapping of str to object
         Values that the user changed, for example with ``--set``.
-    laboratory : mapping of str to float, optional
+    rig_quantities : mapping of str to float, optional
         Quantities of the rig, if the study has a rig.
     """
 
@@ -175,7 +175,7 @@ class StoredStudyDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=
     plot: str
     references: Sequence[str]
     overrides: Mapping[str, Any]
-    laboratory: Mapping[str, float] | None = None
+    rig_quantities: Mapping[str, float] | None = msgspec.field(default=None, name="laboratory")
 
 
 def parse_study_declaration(plain_data: Any) -> StoredStudyDeclaration:

@@ -211,13 +211,15 @@ def build_study_from_declaration(
         for name in ("reductions", "source_file"):
             parts[name] = getattr(study_with_user_code, name)
         kind = study_with_user_code.measure
-        stated = {name: v for name, v in declaration.measure.items() if name in kind.plain_fields}
+        stated = {
+            name: v for name, v in declaration.measure.items() if name in kind.scalar_field_values
+        }
         parts["measure"] = kind.with_(**stated)
     try:
         parts["axes"] = [axis.build_axis(own) for axis in declaration.axes]
-        del parts["laboratory"]
-        if declaration.laboratory is not None:
-            parts["rig"] = build_rig(declaration.laboratory)
+        del parts["rig_quantities"]
+        if declaration.rig_quantities is not None:
+            parts["rig"] = build_rig(declaration.rig_quantities)
         return Study(**parts)
     except InvalidValue as error:
         raise build_invalid_entry_error("declaration", f"is not a valid study ({error})") from error

@@ -105,7 +105,7 @@ def replace_field_values(axis: Axis, field_name: str, new_values: Sequence[Any])
         if field_name not in row:
             points[label] = row
             continue
-        for value in map(partial(Axis.plain_value_converter, field_name), new_values):
+        for value in map(partial(Axis.convert_to_plain_value, field_name), new_values):
             changed = {**row, field_name: value}
             if changed in points.values():
                 continue
@@ -172,7 +172,7 @@ def convert_field_values_to_plain_data(field_name: str, value_or_list: Any) -> A
         Plain value or list of plain values.
     """
     return (
-        [Axis.plain_value_converter(field_name, each) for each in value_or_list]
+        [Axis.convert_to_plain_value(field_name, each) for each in value_or_list]
         if is_sequence_of_axis_values(value_or_list)
-        else Axis.plain_value_converter(field_name, value_or_list)
+        else Axis.convert_to_plain_value(field_name, value_or_list)
     )

@@ -13,7 +13,7 @@ from rsfstudy.former_data_names import (
     NEW_VERDICT_COLUMN_BY_FORMER_COLUMN,
     TableAcceptingFormerColumnNames,
 )
-from rsfstudy.quantities import HtmlMarkup
+from rsfstudy.quantities import HtmlText
 
 _INEQUALITY_SIGN_BY_RELATION = {"equals": "", "below": "< ", "above": "> "}
 #: Width of a line on a terminal, and width of the column with the identifiers of the claims, in
@@ -96,7 +96,7 @@ class ClaimVerdictTable(TableAcceptingFormerColumnNames):
     def _repr_html_(self) -> str:
         rows = [format_verdict_row_for_report(row) for row in self.to_dict("records")]
         return (
-            HtmlMarkup.format_table(list(rows[0]), [list(row.values()) for row in rows])
+            HtmlText.format_table(list(rows[0]), [list(row.values()) for row in rows])
             if rows
             else "<p>no claims</p>"
         )

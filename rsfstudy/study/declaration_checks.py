@@ -97,7 +97,7 @@ def check_name_clashes(
                 choices=known,
             )
         known.append(reduction.name)
-    taken = {*known, *measure.inner_coordinates, *(RESERVED_NAMES - set(SceneFields.NAMES))}
+    taken = {*known, *measure.output_coordinates, *(RESERVED_NAMES - set(SceneFields.NAMES))}
     for axis in axes:
         check_fields_not_solved_by_measure(measure, axis.fields)
         for name in (axis.dimension, *axis.fields):
@@ -147,7 +147,7 @@ def check_user_field_names_are_unused(
     InvalidValue
         If a field has the name of a result, of a reduction, or of a quantity in the vocabulary.
     """
-    taken = {*measure.variables, *measure.inner_coordinates}
+    taken = {*measure.variables, *measure.output_coordinates}
     taken |= {*RESERVED_NAMES, *QUANTITY_BY_NAME, *(reduction.name for reduction in reductions)}
     for name in scene_field_names[len(SceneFields.NAMES) :]:
         if name in taken - SceneFields.PART_SLOT_NAMES:
@@ -184,7 +184,7 @@ def check_axis_fields_and_units(
         has units and the study has no rig.
     """
     in_units = axis_unit_converter.units_by_axis_name if axis_unit_converter else {}
-    known = dict.fromkeys((*scene_field_names, *measure.plain_fields, *in_units))
+    known = dict.fromkeys((*scene_field_names, *measure.scalar_field_values, *in_units))
     for axis in axes:
         if not axis.varies_single_field and axis.dimension in (*scene_field_names, *axis.fields):
             rule = "has the same name as a field, which is not permitted for a zipped axis"
@@ -225,8 +225,8 @@ def check_outputs_are_same_in_all_cells(
     given = _describe_measure_outputs(measure)
     for changed in (measure.with_(**values) for values in measure_field_changes_of_cells):
         if _describe_measure_outputs(changed) != given:
-            present = measure.plain_fields.items()
-            guilty = [n for n, v in changed.plain_fields.items() if (n, v) not in present]
+            present = measure.scalar_field_values.items()
+            guilty = [n for n, v in changed.scalar_field_values.items() if (n, v) not in present]
             rule = (
                 "cannot vary along an axis, because it determines which variables are computed, "
                 "and all cells of a study must compute the same variables"
@@ -357,5 +357,5 @@ def _describe_measure_outputs(measure: Measure) -> str:
     The description is a string, because two NaN values compare equal only after conversion to
     strings.
     """
-    inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
+    inner = {name: np.asarray(at).tolist() for name, at in measure.output_coordinates.items()}
     return repr((measure.primary_output, dict(measure.variables), inner, measure.solved_fields))

@@ -302,7 +302,7 @@ def check_is_figure(figure_or_name: Any) -> None:
         a figure of the package.
     """
     if isinstance(figure_or_name, str):
-        Axis.storable_text_checker("plot", figure_or_name)
+        Axis.check_storable_text("plot", figure_or_name)
         return
     if isinstance(figure_or_name, Figure):
         return

@@ -51,7 +51,7 @@ from rsfstudy.study.user_defined_parts import (
 _MAX_STUDY_NAME_BYTES = 200
 #: Scene fields that select the type of a part of the slider, for example the friction law.
 _PART_SELECTING_FIELDS = frozenset(
-    {*SceneFields.PART_SLOT_NAMES, *SceneFields.NAMES_SELECTING_A_PART}
+    {*SceneFields.PART_SLOT_NAMES, *SceneFields.PART_SELECTING_FIELD_NAMES}
 )
 #: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio to the reference
 #: velocity. The spring can be given as a stiffness or as a ratio to the critical stiffness.
@@ -164,7 +164,7 @@ class Study:
             )
             raise InvalidValue("name", self.name, rule)
         for name in ("title", "summary", "source_file"):
-            Axis.storable_text_checker(name, getattr(self, name))
+            Axis.check_storable_text(name, getattr(self, name))
         check_is_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
@@ -582,7 +582,7 @@ class Study:
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
         of_rig = units is not None
         known = dict.fromkeys(
-            (*self.dimensions, *self.all_scene_field_names, *self.measure.plain_fields)
+            (*self.dimensions, *self.all_scene_field_names, *self.measure.scalar_field_values)
         )
         if (
             field_name not in known

@@ -8,7 +8,7 @@ from dataclasses import replace
 from rsfstudy.axes import Axis
 from rsfstudy.formatting import format_abbreviated_list
 from rsfstudy.measures import Measure
-from rsfstudy.quantities import HtmlMarkup, Quantity, format_quantities_as_html_table
+from rsfstudy.quantities import HtmlText, Quantity, format_quantities_as_html_table
 from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.vocabulary import find_quantity
 
@@ -57,11 +57,9 @@ def format_study_as_html(
     )
 
 
-def _build_collapsed_html_section(caption: str, content: HtmlMarkup) -> HtmlMarkup:
+def _build_collapsed_html_section(caption: str, content: HtmlText) -> HtmlText:
     """Return HTML code that shows the content when the user clicks the caption."""
-    return HtmlMarkup(
-        f"<details><summary>{HtmlMarkup.escape(caption)}</summary>{content}</details>"
-    )
+    return HtmlText(f"<details><summary>{HtmlText.escape(caption)}</summary>{content}</details>")
 
 
 def _find_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:

@@ -250,7 +250,7 @@ def _parts_with(name: str) -> str:
         f"`{part.name}`"
         for slot in part_registry.PART_SLOTS
         for part in slot.built_in_parts.values()
-        if name in SceneFields.list_names_of_part(part)
+        if name in SceneFields.list_part_field_names(part)
     ]
     return ", ".join(owners)
 
@@ -271,7 +271,8 @@ def _slot(slot: part_registry.PartSlot) -> str:
     rows = (
         (f"`{name}`" + (" (default)" if name == slot.default_part_name else ""),
          first_paragraph(part), equation(part),
-         ", ".join(f"`{own}`" for own in SceneFields.list_names_of_part(part)), f"`{SCENES[name]}`")
+         ", ".join(f"`{own}`" for own in SceneFields.list_part_field_names(part)),
+         f"`{SCENES[name]}`")
         for name, part in slot.built_in_parts.items()
     )  # fmt: skip
     made = markdown_table(("choice", "description", "equation", "fields", "example"), rows)

@@ -157,7 +157,7 @@ def inertia_numbers(random: Random) -> Iterator[Number]:
     if any(outcome.status is not Status.OK for outcome in outcomes):
         return
     (found, exact), work = (each.values for each in outcomes), outcomes[0].rhs_evaluations
-    for name in measure.outputs_with_error:
+    for name in measure.names_of_outputs_with_error:
         value, estimate, reference, uncertainty = (
             float(values[key]) for values in (found, exact) for key in (name, f"{name}_error")
         )

@@ -40,7 +40,7 @@ class TrivialMeasure(Measure):
     name: ClassVar[str] = "free"
     primary_output: ClassVar[str] = "total"
     variables: ClassVar = {"total": ()}
-    typical_work: ClassVar[int] = 1
+    typical_rhs_evaluations: ClassVar[int] = 1
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Return b/a, and charge one right-hand-side evaluation."""

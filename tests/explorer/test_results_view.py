@@ -67,7 +67,7 @@ def test_a_map_finds_the_cell_at_a_position(results):
     assert found.find_cell_number_at(1.6, 1.19) == 5  # the second point of the dataset is b/a = 1.5
     assert found.find_cell_number_at(9.0, 1.19) == -1
     image = sample_map_at_pixels(found, (1.25, 4.5), (1.05, 1.25), (2, 13))
-    np.testing.assert_array_equal(image[:, [0, 3, 12]], found.values[:, [0, 1, 3]])
+    np.testing.assert_array_equal(image[:, [0, 3, 12]], found.cell_values[:, [0, 1, 3]])
 
 
 def test_a_cell_of_a_part_of_the_results_is_refused(results):

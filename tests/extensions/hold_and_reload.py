@@ -29,7 +29,7 @@ class PeakAfterRest(Measure):
         Output("peak_stress", "", "1", "rise of stress to its peak", "sigma_*", error=True),
         Output("relaxation", "", "1", "change of stress during the hold", "sigma_*"),
     )
-    typical_work = 4_000
+    typical_rhs_evaluations = 4_000
 
     def compute(self, scene, integrator):
         (left, peak), (_left, again) = (

@@ -12,7 +12,7 @@ class LoadingTime(Measure):
     name: ClassVar[str] = "loading_time"
     primary_output = "loading_time"
     outputs = (Output("loading_time", "$t_a$", "s", "time in which loading speeds slip up"),)
-    typical_work = 1
+    typical_rhs_evaluations = 1
 
     def compute(self, scene, integrator):
         stressing = scene.stiffness * scene.load_velocity * scene.reference_rate

@@ -34,7 +34,7 @@ class CheckCommandResult(CommandResult):
     ----------
     study_results : sequence of StudyResults
         Results of the studies that have been run.
-    verdicts : pandas.DataFrame or None
+    claim_verdicts : pandas.DataFrame or None
         Table of the claims and their verdicts, or None if there are no results.
     inapplicable_claim_ids : sequence of str, optional
         Identifiers of the requested claims that do not apply to the results.
@@ -46,7 +46,7 @@ class CheckCommandResult(CommandResult):
     """
 
     study_results: Sequence[StudyResults]
-    verdicts: pd.DataFrame | None
+    claim_verdicts: pd.DataFrame | None
     inapplicable_claim_ids: Sequence[str] = ()
     skip_reason_by_study: Mapping[str, str] = field(default_factory=dict)
     study_names_without_results: Sequence[str] = ()
@@ -58,7 +58,9 @@ class CheckCommandResult(CommandResult):
         The status is 1 if a verdict changed, if a cell failed or has not been computed, or if a
         study or a claim was not checked.
         """
-        changed = self.verdicts is not None and bool(self.verdicts["verdict_changed"].any())
+        changed = self.claim_verdicts is not None and bool(
+            self.claim_verdicts["verdict_changed"].any()
+        )
         complete = all(one.is_complete_without_failures for one in self.study_results)
         failed = (
             changed
@@ -73,7 +75,11 @@ class CheckCommandResult(CommandResult):
         from rsfstudy.cli.study_results import convert_verdicts_to_json
 
         only = self.study_results[0].study_name if len(self.study_results) == 1 else ""
-        claims = [] if self.verdicts is None else convert_verdicts_to_json(self.verdicts, only)
+        claims = (
+            []
+            if self.claim_verdicts is None
+            else convert_verdicts_to_json(self.claim_verdicts, only)
+        )
         return {
             "studies": [one.to_json_fields() for one in self.study_results],
             "claims": claims,
@@ -153,11 +159,11 @@ def _print_check_result(result: CheckCommandResult) -> None:
         print_line(f"{name}: skipped: {reason}", style="yellow")
     for name in result.study_names_without_results:
         print_line(f"{name}: not run yet", style="red")
-    if result.verdicts is None:
+    if result.claim_verdicts is None:
         return
     if len(result.study_results) == 1:
         print_study_heading(result.study_results[0])
-    print_verdicts(result.verdicts)
+    print_verdicts(result.claim_verdicts)
     for one in result.study_results:
         print_failed_cells(one, with_rerun_commands=False)
     if result.inapplicable_claim_ids:

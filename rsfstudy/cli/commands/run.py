@@ -43,9 +43,9 @@ class StudyRunOutcome:
         Name of the study.
     elapsed_seconds : float, optional
         Elapsed time in s, or None if the study was skipped.
-    results : StudyResults, optional
+    study_results : StudyResults, optional
         Results of the study, or None if the run was skipped or did not finish.
-    verdicts : pandas.DataFrame, optional
+    claim_verdicts : pandas.DataFrame, optional
         Verdicts on the claims, or None if the run was skipped or did not finish.
     failure_descriptions : sequence of str, optional
         Descriptions of failed cells, of changed verdicts, and of a figure that could not be drawn.
@@ -59,8 +59,8 @@ class StudyRunOutcome:
 
     study_name: str
     elapsed_seconds: float | None = None
-    results: StudyResults | None = None
-    verdicts: pd.DataFrame | None = None
+    study_results: StudyResults | None = None
+    claim_verdicts: pd.DataFrame | None = None
     failure_descriptions: Sequence[str] = ()
     output_files: Sequence[Path] = ()
     reason_for_missing_results: str = ""
@@ -71,7 +71,7 @@ class StudyRunOutcome:
         """Label of the outcome: "ok", "failed", "skipped" or "not_finished"."""
         if self.elapsed_seconds is None:
             return "skipped"
-        if self.results is None:
+        if self.study_results is None:
             return "not_finished"
         return "failed" if self.failure_descriptions else "ok"
 
@@ -81,8 +81,8 @@ class StudyRunOutcome:
 
         claims = (
             []
-            if self.verdicts is None
-            else convert_verdicts_to_json(self.verdicts, self.study_name)
+            if self.claim_verdicts is None
+            else convert_verdicts_to_json(self.claim_verdicts, self.study_name)
         )
         return {
             "study": self.study_name,
@@ -91,7 +91,7 @@ class StudyRunOutcome:
             "problems": self.failure_descriptions,
             "seconds": self.elapsed_seconds,
             "files": self.output_files,
-            "results": None if self.results is None else self.results.to_json_fields(),
+            "results": None if self.study_results is None else self.study_results.to_json_fields(),
             "claims": claims,
         }
 
@@ -236,7 +236,7 @@ def _print_expected_cost(study: Study, command_options: options.CommandOptions) 
 
     plan = CellPlan(study)
     if command_options.is_rtol_specified and not command_options.as_json:
-        ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
+        ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_rhs_evaluations
         words = f"{study.name}: {ratio:.2g} times the work of rtol {Accuracy.DEFAULT_RTOL:g}"
         print_line(f"{words}, {cost_estimates.describe_study_cost(plan, command_options.output)}")
     if not (command_options.every or command_options.quiet) and (
@@ -300,7 +300,7 @@ def _run_study(
         dataset, build_default_figure_path(file, command_options), command_options, own
     )
     results = StudyResults(dataset, str(file))
-    verdicts, seconds = results.verdicts, time.monotonic() - began
+    verdicts, seconds = results.claim_verdicts, time.monotonic() - began
     _counts, problems = summarise_verdicts_and_failures(dataset, verdicts)
     if not drawn:
         problems.append("no figure")
@@ -326,15 +326,15 @@ def _print_study_report(run_outcome: StudyRunOutcome) -> None:
         format_status_counts,
     )
 
-    assert run_outcome.results is not None
-    assert run_outcome.verdicts is not None
-    dataset = run_outcome.results.dataset
+    assert run_outcome.study_results is not None
+    assert run_outcome.claim_verdicts is not None
+    dataset = run_outcome.study_results.dataset
     print_tables_and_sentences(build_reduction_tables_and_sentences(dataset))
     if slow := format_note_on_low_instability_norms(dataset):
         print_line(slow, style="yellow")
-    print_study_heading(run_outcome.results)
-    print_verdicts(run_outcome.verdicts)
-    print_failed_cells(run_outcome.results)
+    print_study_heading(run_outcome.study_results)
+    print_verdicts(run_outcome.claim_verdicts)
+    print_failed_cells(run_outcome.study_results)
     print_line(f"{run_outcome.study_name}: {format_status_counts(dataset)}")
     if note := run_outcome.note_on_reused_cells:
         print_line(f"{note}, and the evaluations include these cells")
@@ -351,22 +351,22 @@ def _print_short_study_report(run_outcome: StudyRunOutcome) -> None:
     from rsfstudy.formatting import format_duration, format_overrides
     from rsfstudy.reporting import format_verdict_counts, summarise_study_as_text_lines
 
-    assert run_outcome.results is not None
-    assert run_outcome.verdicts is not None
+    assert run_outcome.study_results is not None
+    assert run_outcome.claim_verdicts is not None
     assert run_outcome.elapsed_seconds is not None
-    dataset, overrides = run_outcome.results.dataset, run_outcome.results.overrides
+    dataset, overrides = run_outcome.study_results.dataset, run_outcome.study_results.overrides
     print_line(f"{run_outcome.study_name}: {dataset.attrs['title']}", style="bold", soft_wrap=True)
     for line in (
         *([f"overrides: {format_overrides(overrides)}"] if overrides else []),
         *summarise_study_as_text_lines(dataset),
         *([note] if (note := run_outcome.note_on_reused_cells) else []),
-        f"claims: {format_verdict_counts(run_outcome.verdicts) or '-'}",
+        f"claims: {format_verdict_counts(run_outcome.claim_verdicts) or '-'}",
         f"in {format_duration(run_outcome.elapsed_seconds)}, wrote "
         f"{' and '.join(map(str, run_outcome.output_files))}",
     ):
         print_line(f"  {line}", soft_wrap=True)
-    print_unexpected_verdicts(run_outcome.verdicts)
-    print_failed_cells(run_outcome.results)
+    print_unexpected_verdicts(run_outcome.claim_verdicts)
+    print_failed_cells(run_outcome.study_results)
 
 
 def _print_table_of_study_runs(command_result: RunCommandResult) -> None:
@@ -380,7 +380,9 @@ def _print_table_of_study_runs(command_result: RunCommandResult) -> None:
         {
             "study": one.study_name,
             "time": "-" if one.elapsed_seconds is None else format_duration(one.elapsed_seconds),
-            "verdicts": "-" if one.verdicts is None else format_verdict_counts(one.verdicts) or "-",
+            "verdicts": "-"
+            if one.claim_verdicts is None
+            else format_verdict_counts(one.claim_verdicts) or "-",
             "status": ", ".join(one.failure_descriptions)
             or texts[one.outcome_label].format(one.reason_for_missing_results.partition(" (")[0]),
         }

@@ -29,22 +29,22 @@ if TYPE_CHECKING:
 class VerifyCommandResult(CommandResult):
     """Comparison of solution files with the reference solutions."""
 
-    answer_files: Sequence[Path]
-    answer_comparisons: Sequence[AnswerComparison]
+    benchmark_answer_files: Sequence[Path]
+    benchmark_answer_comparisons: Sequence[AnswerComparison]
 
     @property
     def exit_status(self) -> int:
         """Exit status. The status is 1 if a file has too few correct digits."""
-        passed = all(one.has_required_digits for one in self.answer_comparisons)
+        passed = all(one.has_required_digits for one in self.benchmark_answer_comparisons)
         return EXIT_STATUS_OK if passed else EXIT_STATUS_FAILED
 
     def to_json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
         from rsfstudy.referee import summarise_answer_comparisons
 
-        pairs = zip(self.answer_files, self.answer_comparisons, strict=True)
+        pairs = zip(self.benchmark_answer_files, self.benchmark_answer_comparisons, strict=True)
         return {
-            "summary": summarise_answer_comparisons(self.answer_comparisons),
+            "summary": summarise_answer_comparisons(self.benchmark_answer_comparisons),
             "files": [_convert_answer_comparison_to_json(file, one) for file, one in pairs],
         }
 
@@ -68,10 +68,10 @@ def _convert_answer_comparison_to_json(file: Path, comparison: AnswerComparison)
                 "name": one.quantity_name,
                 "digits": one.agreeing_digits,
                 "agrees_to_written_digits": one.agrees_within_rounding_error,
-                "least_agreeing_at": None if index is None else index[one.least_agreeing_row],
+                "least_agreeing_at": None if index is None else index[one.least_agreeing_row_index],
                 "first_failing_at": None
-                if index is None or one.first_failing_row is None
-                else index[one.first_failing_row],
+                if index is None or one.first_failing_row_index is None
+                else index[one.first_failing_row_index],
             }
             for one in comparison.quantity_agreements
         ],
@@ -147,7 +147,9 @@ def _print_verification(result: VerifyCommandResult) -> None:
     """Print the correct digits of each quantity, and possible explanations."""
     from rsfstudy.referee import summarise_answer_comparisons
 
-    for file, one in zip(result.answer_files, result.answer_comparisons, strict=True):
+    for file, one in zip(
+        result.benchmark_answer_files, result.benchmark_answer_comparisons, strict=True
+    ):
         problem = one.benchmark_problem
         known = f"reference known to {problem.digits} digits"
         name = f"problem {problem.number}" if problem.number else known
@@ -158,7 +160,7 @@ def _print_verification(result: VerifyCommandResult) -> None:
         if not one.has_required_digits:
             unexplained = "no common difference in conventions explains the disagreement"
             print_line(f"  {one.explanation_of_disagreement or unexplained}")
-    print_line(summarise_answer_comparisons(result.answer_comparisons), style="bold")
+    print_line(summarise_answer_comparisons(result.benchmark_answer_comparisons), style="bold")
 
 
 def _write_agreement_figure(

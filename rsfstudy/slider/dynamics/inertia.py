@@ -355,7 +355,7 @@ class Inertia(Dynamics):
     inertia: bool = flag(False, "1 if the slider has mass, otherwise 0")
 
     name = "inertia"
-    selecting_field_name = "inertia"
+    field_name_that_selects_part = "inertia"
     regime_name = "slow_manifold"
     build_slip_rate_functions = staticmethod(build_slow_manifold_slip_rate_functions)
     build_rate_function_for_ruptures = staticmethod(build_rate_function_for_ruptures)

@@ -152,7 +152,7 @@ class RadiationDamping(Dynamics):
     )
 
     name = "radiation_damping"
-    selecting_field_name = "radiation_damping"
+    field_name_that_selects_part = "radiation_damping"
     regime_name = "quasi_dynamic"
     build_slip_rate_functions = staticmethod(build_damped_slip_rate_functions)
 

@@ -160,7 +160,7 @@ class LawBase(Part):
     members_derived_from_equations = (
         "has_closed_orbits_at_critical_stiffness",
         "lacks_characteristic_slip_rate",
-        "relaxation",
+        "state_relaxation_function",
     )
     members_defining_equations = frozenset({"evolution", "evolutions"})
     received_quantity_names = QUANTITIES_RECEIVED_BY_LAWS
@@ -175,11 +175,12 @@ class LawBase(Part):
     has_logarithmic_state: ClassVar[bool] = True
     #: True if the law contains no characteristic slip rate, so the choice of V_* is arbitrary.
     lacks_characteristic_slip_rate: ClassVar[bool] = False
-    #: Function ``relaxation(rate, slip)``, the closed-form solution at constant normal stress and
-    #: constant slip rate. The argument ``rate`` is ln(V/V_*), and ``slip`` is the slip in D_c. The
-    #: function returns the difference between the friction coefficient and its steady value,
-    #: divided by b. If the function uses fields of the law, ``relaxation`` is a method.
-    relaxation: ClassVar[NumericFunction | None] = None
+    #: Function ``state_relaxation_function(rate, slip)``, the closed-form solution at constant
+    #: normal stress and constant slip rate. The argument ``rate`` is ln(V/V_*), and ``slip`` is the
+    #: slip in D_c. The function returns the difference between the friction coefficient and its
+    #: steady value, divided by b. If the function uses fields of the law,
+    #: ``state_relaxation_function`` is a method.
+    state_relaxation_function: ClassVar[NumericFunction | None] = None
     evolution: ClassVar[NumericFunction | None] = None
     evolutions: ClassVar[NumericFunction | None] = None
     steady_states: ClassVar[NumericFunction | None] = None
@@ -282,7 +283,7 @@ class LawBase(Part):
             scene.
         """
         stress, fluid = scene.parts.normal_stress, scene.parts.fluid
-        loading, source = scene.parts.loading, scene.pressure_source
+        loading, source = scene.parts.loading, scene.part_changing_effective_stress
         bends = stress.normal_stress is not None and not stress.coupling
         unknown = f"normal_stress={stress.name!r}" if bends else ""
         if fluid.unknowns:
@@ -308,7 +309,7 @@ class LawBase(Part):
             source if pressed else None if scene.dynamics.allows_reversed_slip else scene.dynamics
         )
         if self.regularised and one_way:
-            selector = one_way.selecting_field_name
+            selector = one_way.field_name_that_selects_part
             other = (
                 f"{selector}={getattr(one_way, selector)!r}"
                 if selector
@@ -430,9 +431,11 @@ class Law(LawBase):
             )
             remedy = "Omit alpha and stress_dependence, or pass another value of b_over_a."
             raise self.build_field_error("b_over_a", rule, remedy)
-        if not self.b_over_a and scene.parts.slider.initial_state:
+        if not self.b_over_a and scene.parts.slider_parameters.initial_state:
             rule = "has no effect, because b_over_a is 0"
-            raise scene.parts.slider.build_field_error("initial_state", rule, "Omit initial_state.")
+            raise scene.parts.slider_parameters.build_field_error(
+                "initial_state", rule, "Omit initial_state."
+            )
         if 0.0 < abs(self.b_over_a) < MIN_NONZERO_B_OVER_A:
             raise self.build_field_error(
                 "b_over_a",
@@ -476,7 +479,7 @@ def lacks_critical_stiffness(scene: SceneView) -> bool:
         True if the scene has no explicit stiffness and its critical stiffness is not a positive
         finite number.
     """
-    stated = scene.parts.slider.stiffness is not None
+    stated = scene.parts.slider_parameters.stiffness is not None
     return not stated and not 0.0 < scene.critical_stiffness < math.inf
 
 

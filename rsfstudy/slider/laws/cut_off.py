@@ -142,7 +142,7 @@ class CutOffLaw(Law):
         """
         return (*super().parameter_values(scene), *self._compute_cutoff_and_reference_fractions())
 
-    def relaxation(self, log_slip_rate: float, slip: float) -> float:
+    def state_relaxation_function(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.
 
         Parameters

@@ -69,10 +69,10 @@ class SlipToSlownessLaw(Law):
         True  # The derivative dh/du = -(1 + eps h) is linear in h.
     )
 
-    def relaxation(self, log_slip_rate: float, slip: float) -> float:
+    def state_relaxation_function(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.
 
-        See ``LawBase.relaxation``.
+        See ``LawBase.state_relaxation_function``.
 
         Notes
         -----

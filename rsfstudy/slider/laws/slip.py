@@ -34,10 +34,10 @@ def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: Floa
     return -(state + p[LAW] * log_slip_rate)
 
 
-def compute_state_minus_steady_state_over_b(log_slip_rate: float, slip: float) -> float:
+def compute_scaled_state_relaxation(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
-    See ``LawBase.relaxation`` for the arguments.
+    See ``LawBase.state_relaxation_function`` for the arguments.
 
     Notes
     -----
@@ -60,6 +60,6 @@ class SlipLaw(Law):
 
     name = "slip"
     evolution = staticmethod(compute_state_evolution_per_slip)
-    relaxation = staticmethod(compute_state_minus_steady_state_over_b)
+    state_relaxation_function = staticmethod(compute_scaled_state_relaxation)
     lacks_characteristic_slip_rate = True
     has_closed_orbits_at_critical_stiffness = True  # See Gu et al. (1984).

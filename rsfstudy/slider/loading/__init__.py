@@ -154,7 +154,7 @@ class Loading(Part):
         """
         if len(self.segments) > 1:
             self._check_segment_durations()
-        fluid, name = scene.parts.fluid, self.selecting_field_name
+        fluid, name = scene.parts.fluid, self.field_name_that_selects_part
         if self.unknowns and fluid.unknowns and not self.of_pressure:
             rule = f"cannot be combined with fluid={fluid.name!r}"
             rule += ", because both change the effective normal stress"
@@ -286,7 +286,9 @@ class Loading(Part):
             if str(field_name) in p.__dataclass_fields__
         )
         wanted = " or ".join(
-            p.selecting_field_name for p in owners if p.selecting_field_name not in ("", field_name)
+            p.field_name_that_selects_part
+            for p in owners
+            if p.field_name_that_selects_part not in ("", field_name)
         )
         remedy = f"Omit {field_name}, or also set {wanted}." if wanted else f"Omit {field_name}."
         # The name of a protocol is an attribute of the instance, not of the class.

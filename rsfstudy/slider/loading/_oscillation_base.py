@@ -137,7 +137,7 @@ class OscillationBase(LoadingWithFinalVelocityBase):
             raise self.build_field_error("oscillation_period", rule, remedy)
 
     @property
-    def initial_phase(self) -> float:
+    def initial_phase_in_radians(self) -> float:
         """Initial phase of the oscillation in radians."""
         return math.radians(self.oscillation_phase or 0.0)
 

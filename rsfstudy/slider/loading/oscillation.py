@@ -54,7 +54,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
     )
 
     name = "oscillation"
-    selecting_field_name = "oscillation_amplitude"
+    field_name_that_selects_part = "oscillation_amplitude"
     unknowns = (
         Quantity(
             "oscillation_ahead",
@@ -81,7 +81,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
 
         See ``Loading.initial_unknowns``.
         """
-        amplitude, angle = self.oscillation_amplitude, self.initial_phase
+        amplitude, angle = self.oscillation_amplitude, self.initial_phase_in_radians
         return amplitude * math.cos(angle), -amplitude * math.sin(angle)
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:

@@ -97,7 +97,7 @@ class NormalStressRamp(LoadingWithFinalVelocityBase):
     load_velocity_ratio: float | None = declare_load_velocity_field()
 
     name = "ramp"
-    selecting_field_name = "normal_stress_ramp"
+    field_name_that_selects_part = "normal_stress_ramp"
     unknowns = (
         Quantity("ramp_left", "$P$", "1", "remaining change of imposed normal stress", "sigma_*"),
     )

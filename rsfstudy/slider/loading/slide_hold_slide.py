@@ -48,7 +48,7 @@ class SlideHoldSlide(LoadingWithFinalVelocityBase):
     load_velocity_ratio: float | None = declare_load_velocity_field()
 
     name = "slide_hold_slide"
-    selecting_field_name = "hold_time"
+    field_name_that_selects_part = "hold_time"
 
     @property
     def segments(self) -> tuple[Segment, ...]:

@@ -54,7 +54,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
     )
 
     name = "velocity_oscillation"
-    selecting_field_name = "velocity_oscillation"
+    field_name_that_selects_part = "velocity_oscillation"
     adds_load_point_displacement_unknown = True
     unknowns = (
         Quantity(
@@ -91,7 +91,9 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         See ``Loading.initial_unknowns``. The last unknown is :math:`-K R \cos(\omega t + \phi_o)`.
         """
         stress = self.compute_shear_stress_amplitude(scene)
-        return -stress * math.sin(self.initial_phase), -stress * math.cos(self.initial_phase)
+        return -stress * math.sin(self.initial_phase_in_radians), -stress * math.cos(
+            self.initial_phase_in_radians
+        )
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
         """Return the parameters of the oscillation.

@@ -64,7 +64,7 @@ class VelocityRamp(Loading):
     )
 
     name = "velocity_ramp"
-    selecting_field_name = "velocity_ramp"
+    field_name_that_selects_part = "velocity_ramp"
 
     @property
     def segments(self) -> tuple[Segment, ...]:

@@ -61,7 +61,7 @@ class VelocitySteps(Loading):
     )
 
     name = "velocity_steps"
-    selecting_field_name = "velocity_steps"
+    field_name_that_selects_part = "velocity_steps"
 
     @property
     def segments(self) -> tuple[Segment, ...]:

@@ -66,13 +66,13 @@ class Reduction(ConstructorKeywordCheckMixin):
 
         kind: ClassVar[str]
         long_names: ClassVar[Mapping[str, str]]
-        unit_fields: ClassVar[Mapping[str, Sequence[str]]]
+        fields_determining_result_units: ClassVar[Mapping[str, Sequence[str]]]
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
 
     ``kind`` is the name of the reduction in files, by default the class name. ``long_names`` and
-    ``unit_fields`` define the long names and the units of the results. ``derivatives`` returns
-    derivatives of the result. The derivatives are used to compute ``<name>_error`` from the
-    numerical errors of the cells.
+    ``fields_determining_result_units`` define the long names and the units of the results.
+    ``derivatives`` returns derivatives of the result. The derivatives are used to compute
+    ``<name>_error`` from the numerical errors of the cells.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Reduction(ConstructorKeywordCheckMixin):
     #: name of the result. For ``("of",)``, the result has the units of the variable that the field
     #: ``of`` names. For ``("of", "on")``, the result has the units of the first variable divided by
     #: the units of the second variable. Results without an entry are dimensionless.
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
     #: True if the reduction also uses failed cells. All other reductions reject failed cells.
     uses_failed_cells: ClassVar[bool] = False
 

@@ -75,7 +75,7 @@ class Boundary(Reduction):
     on: str = ""
     level: float = 0.5
     kind: ClassVar[str] = "boundary"
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("on",)}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Find the boundary for each point along the other dimensions.
@@ -212,7 +212,7 @@ class Inverse(Reduction):
     uncertainty: float | Mapping[str, float] = 0.0
     along: str = ""
     kind: ClassVar[str] = "inverse"
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("on",)}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("on",)}
 
     @property
     def quantities(self) -> Sequence[Quantity]:

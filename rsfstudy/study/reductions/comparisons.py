@@ -62,7 +62,7 @@ class Difference(Reduction):
     along: str = ""
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
     formula_template: ClassVar[str] = "{of} minus {reference}"
 
     def compute_difference(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -198,7 +198,7 @@ class RelativeDifference(Difference):
     """
 
     kind: ClassVar[str] = "relative_difference"
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
     formula_template: ClassVar[str] = "1 - {of} / {reference}"
 
     def compute_difference(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -273,7 +273,7 @@ class Range(Reduction):
     over: str = ""
     within: tuple[float, float] | None = None
     kind: ClassVar[str] = "range"
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
 
     def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
         """Return the status of the cells in the coordinate range ``within``.
@@ -392,7 +392,9 @@ class ClosedFormRatio(Reduction):
         "_closed_form": "closed-form value of {of}",
         "_error": "numerical error estimate of the ratio of {of} to its closed-form value",
     }
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"_closed_form": ("of",)}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {
+        "_closed_form": ("of",)
+    }
 
     def __post_init__(self) -> None:
         """Check that the closed-form solution exists."""

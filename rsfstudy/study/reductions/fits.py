@@ -69,7 +69,7 @@ class LinearFit(Reduction):
     #: Template of an explanation of the slope, which is appended to the attribute ``comment``.
     _slope_note_template: ClassVar[str] = ""
     kind: ClassVar[str] = "linear_fit"
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {
         "": ("of", "on"),
         "_misfit": ("of",),
     }
@@ -338,7 +338,7 @@ class SemilogFit(LinearFit):
     """
 
     kind: ClassVar[str] = "decade_fit"
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
     formula_template: ClassVar[str] = "{of} = constant + {name} * log10({on})"
     _slope_note_template: ClassVar[str] = "; the slope is the change of {of} per decade of {on}"
 
@@ -396,7 +396,7 @@ class PowerLaw(SemilogFit):
     """
 
     kind: ClassVar[str] = "power_law"
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {}
     formula_template: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
     _slope_note_template: ClassVar[str] = "; the slope is the exponent of the power law"
 

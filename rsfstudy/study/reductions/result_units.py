@@ -28,13 +28,14 @@ def build_result_quantities(
 ) -> dict[str, Quantity]:
     """Determine the quantities of the results of a reduction.
 
-    ``Reduction.unit_fields`` names one variable or two variables for each result. If one variable
-    is named, the result has the units and the scale of this variable. If two variables are named,
-    the units and the scale of the first variable are divided by the units and the scale of the
-    second variable. Results without an entry in ``Reduction.unit_fields`` are dimensionless. If the
-    scale varies between the cells that were combined, the result has no scale, and a note is
-    appended to the attribute ``comment`` of the result. The description in the vocabulary is used
-    only if its units and scale agree with the units and scale of the result.
+    ``Reduction.fields_determining_result_units`` names one variable or two variables for each
+    result. If one variable is named, the result has the units and the scale of this variable. If
+    two variables are named, the units and the scale of the first variable are divided by the units
+    and the scale of the second variable. Results without an entry in
+    ``Reduction.fields_determining_result_units`` are dimensionless. If the scale varies between the
+    cells that were combined, the result has no scale, and a note is appended to the attribute
+    ``comment`` of the result. The description in the vocabulary is used only if its units and scale
+    agree with the units and scale of the result.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def build_result_quantities(
     """
     stated = {q.name: q for q in reduction.quantities}
     found, of = read_quantities_not_in_vocabulary(dataset) | stated, dataset[reduction.of]
-    for end, fields in {"": (), **reduction.unit_fields}.items():
+    for end, fields in {"": (), **reduction.fields_determining_result_units}.items():
         name = f"{reduction.name}{end}"
         if name not in reduction_results or (name in stated and not fields):
             continue

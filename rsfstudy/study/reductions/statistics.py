@@ -36,7 +36,7 @@ from rsfstudy.study.reductions.result_units import find_scale_varying_along_dime
 class _SampleStatistic(Reduction):
     """Base class of statistics over samples.
 
-    Subclasses define ``compute_value_and_stderr``, ``description`` and ``min_samples``.
+    Subclasses define ``compute_value_and_stderr``, ``statistic_description`` and ``min_samples``.
 
     Parameters
     ----------
@@ -55,9 +55,12 @@ class _SampleStatistic(Reduction):
         "_stderr": "sampling standard error of {name}",
         "_points": "number of samples with a value of {name}",
     }
-    unit_fields: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",), "_stderr": ("of",)}
+    fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {
+        "": ("of",),
+        "_stderr": ("of",),
+    }
     #: Description of the statistic for the attribute ``comment`` of the results.
-    description: ClassVar[str]
+    statistic_description: ClassVar[str]
 
     #: Minimum number of samples for which the statistic and its standard error are computed.
     min_samples: ClassVar[int] = 2
@@ -126,7 +129,7 @@ class _SampleStatistic(Reduction):
             for result in self.compute_value_and_stderr(of)
         )
         found = {"": value, "_stderr": stderr, "_points": count.astype("int32")}
-        return self.results(f"{self.description} of {self.of} over {self.over}", found)
+        return self.results(f"{self.statistic_description} of {self.of} over {self.over}", found)
 
 
 def compute_standard_deviation(
@@ -183,7 +186,7 @@ class Mean(_SampleStatistic):
     """
 
     kind: ClassVar[str] = "mean"
-    description: ClassVar[str] = "mean"
+    statistic_description: ClassVar[str] = "mean"
 
     def compute_value_and_stderr(
         self, sample_values: xr.DataArray
@@ -262,7 +265,7 @@ class StandardDeviation(_SampleStatistic):
     """
 
     kind: ClassVar[str] = "standard_deviation"
-    description: ClassVar[str] = "standard deviation"
+    statistic_description: ClassVar[str] = "standard deviation"
     min_samples = 3
 
     def compute_value_and_stderr(
@@ -373,7 +376,7 @@ class Quantile(_SampleStatistic):
             raise InvalidValue("level", self.level, "must be between 0 and 1")
 
     @property
-    def description(self) -> str:  # type: ignore[override]
+    def statistic_description(self) -> str:  # type: ignore[override]
         """Name and level of the statistic."""
         return f"quantile at {self.level:g}"
 

@@ -114,7 +114,7 @@ def cycle_problem(scene: Scene) -> Problem:
         / passing
         / (2.0 * scene.load_velocity),
         interval=truth.recurrence_interval,
-        drop=truth.max_spring_stress_deviation - truth.min_spring_stress_deviation,
+        drop=truth.max_spring_stress_minus_steady - truth.min_spring_stress_minus_steady,
     )
 
 

@@ -30,7 +30,7 @@ class RsfstudyEngine:
             found.append(
                 (
                     cycle.recurrence_interval,
-                    cycle.max_spring_stress_deviation - cycle.min_spring_stress_deviation,
+                    cycle.max_spring_stress_minus_steady - cycle.min_spring_stress_minus_steady,
                 )
             )
         return found
