@@ -161,8 +161,8 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.quantities": {
         "ShownAsTable": "HtmlTableMixin",
-        "escape_html": "HtmlMarkup.escape",
-        "html_table": "HtmlMarkup.format_table",
+        "escape_html": "HtmlText.escape",
+        "html_table": "HtmlText.format_table",
     },
     "rsfstudy.quantities:Output": {
         "names": "variable_names",

@@ -305,7 +305,7 @@ class HtmlText(str):
 
         Returns
         -------
-        HtmlMarkup
+        HtmlText
             Table with inline styles.
         """
         above = f"<p><b>{_format_html_table_cell(caption)}</b></p>" if caption else ""
@@ -343,7 +343,7 @@ def format_quantities_as_html_table(
 
     Returns
     -------
-    HtmlMarkup
+    HtmlText
         Table with the columns field, symbol, value, unit and meaning.
     """
     shown = [n for n, text in enumerate(_QUANTITY_TABLE_HEADINGS) if with_values or text != "value"]
@@ -404,7 +404,7 @@ def format_symbol_as_html(latex_symbol: str) -> HtmlText:
 
     Returns
     -------
-    HtmlMarkup
+    HtmlText
         Symbol in italics, with Greek letters, subscripts and superscripts.
     """
     if "$" not in latex_symbol:
@@ -426,7 +426,7 @@ def format_unit_as_html(quantity: Quantity) -> HtmlText:
 
     Returns
     -------
-    HtmlMarkup
+    HtmlText
         Scale of a dimensionless quantity, or the units. The string is empty if a dimensionless
         quantity has no scale.
     """
