@@ -122,7 +122,7 @@ def iterate_panel_selections(
     for place in choose_evenly_spaced_indices(dataset.sizes[selection.facet], MAX_PANELS):
         points = {**selection.point_index_by_dimension, selection.facet: int(place)}
         yield PlotSelection(
-            selection.variable, selection.kind, selection.x, selection.second, "", points
+            selection.variable, selection.kind, selection.x, selection.second_dimension, "", points
         )
 
 
@@ -189,7 +189,7 @@ def extract_curves_of_panel(dataset: xr.Dataset, panel: PlotSelection) -> list[C
     list of CurveData
         One curve per selected point of the colour dimension.
     """
-    along, second = find_dimension_along_x(dataset, panel.variable, panel.x), panel.second
+    along, second = find_dimension_along_x(dataset, panel.variable, panel.x), panel.second_dimension
     dims = ([second] if second else []) + [along]
     arrays = [a.reshape(-1, a.shape[-1]) for a in _extract_panel_arrays(dataset, panel, dims)]
     x = _broadcast_x_values(dataset, panel, along, arrays[0].shape)
@@ -215,7 +215,7 @@ def _broadcast_x_values(
     if values.dtype.kind not in "iuf":
         return np.broadcast_to(np.arange(shape[-1], dtype=float), shape)
     at = {d: i for d, i in panel.point_index_by_dimension.items() if d in values.dims}
-    dims = [d for d in (panel.second, x_dimension) if d in values.dims]
+    dims = [d for d in (panel.second_dimension, x_dimension) if d in values.dims]
     return np.broadcast_to(values.isel(at).transpose(*dims).values.astype(float), shape)
 
 
@@ -265,7 +265,7 @@ def extract_map_of_panel(dataset: xr.Dataset, panel: PlotSelection) -> MapData:
     MapData
         Values and statuses, with increasing coordinates.
     """
-    dims = (panel.second, panel.x)
+    dims = (panel.second_dimension, panel.x)
     y, x = (dataset[d].values.astype(float) for d in dims)
     order = np.ix_(np.argsort(y), np.argsort(x))
     values, _errors, status, cells = (a[order] for a in _extract_panel_arrays(dataset, panel, dims))

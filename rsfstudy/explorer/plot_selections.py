@@ -41,7 +41,7 @@ class PlotSelection:
         Kind of the plot.
     x : str
         Name of the dimension, coordinate or variable along x.
-    second : str
+    second_dimension : str
         Dimension whose points have separate curves, or the vertical axis of a map. If the string is
         empty, there is a single curve.
     facet : str
@@ -53,7 +53,7 @@ class PlotSelection:
     variable: str
     kind: str
     x: str
-    second: str
+    second_dimension: str
     facet: str
     point_index_by_dimension: Mapping[str, int] = field(default_factory=dict)
 
@@ -122,7 +122,7 @@ def complete_plot_selection(
     variable: str | None = None,
     kind: str | None = None,
     x: str | None = None,
-    second: str | None = None,
+    second_dimension: str | None = None,
     facet: str | None = None,
     points: Mapping[str, int] | None = None,
 ) -> PlotSelection:
@@ -136,7 +136,7 @@ def complete_plot_selection(
     ----------
     dataset : xarray.Dataset
         Results of a study.
-    variable, kind, x, second, facet : str, optional
+    variable, kind, x, second_dimension, facet : str, optional
         Requested choices, as in ``PlotSelection``.
     points : mapping of str to int, optional
         Requested indices on the remaining dimensions.
@@ -169,11 +169,11 @@ def complete_plot_selection(
     along = find_dimension_along_x(dataset, variable, str(x))
     others = [d for d in map(str, dataset[variable].dims) if d != along]
     candidates = [d for d in others if d in plane or kind == LINES]
-    if _check_choice_exists("second", second, ["", *known]) not in candidates + [""] * (
-        kind == LINES
-    ):
-        second = _choose_default_second_dimension(dataset, candidates, kind)
-    left = [d for d in others if d != second]
+    if _check_choice_exists(
+        "second_dimension", second_dimension, ["", *known]
+    ) not in candidates + [""] * (kind == LINES):
+        second_dimension = _choose_default_second_dimension(dataset, candidates, kind)
+    left = [d for d in others if d != second_dimension]
     facet = facet if _check_choice_exists("facet", facet, ["", *known]) in left else ""
     given = points or {}
     if not isinstance(given, Mapping):
@@ -184,7 +184,7 @@ def complete_plot_selection(
             rule = f"is not an index of {name}, which has {dataset.sizes[name]} points"
             raise InvalidValue("points", index, rule)
     chosen = {d: given.get(d, 0) for d in left if d != facet}
-    return PlotSelection(variable, str(kind), str(x), second or "", facet or "", chosen)
+    return PlotSelection(variable, str(kind), str(x), second_dimension or "", facet or "", chosen)
 
 
 def _check_choice_exists(choice_name: str, value: Any, choices: Sequence[str]) -> Any:

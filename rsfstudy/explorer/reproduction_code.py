@@ -41,7 +41,7 @@ def draw_figure_of_selection(dataset: xr.Dataset, selection: PlotSelection) -> F
     """
     if selection.kind == MAP:
         part = dataset.isel(dict(selection.point_index_by_dimension)).transpose(
-            ..., selection.second, selection.x
+            ..., selection.second_dimension, selection.x
         )
         return draw_figure(part, variable=selection.variable)
     panel = Panel(**_build_panel_arguments(dataset, selection))
@@ -51,7 +51,7 @@ def draw_figure_of_selection(dataset: xr.Dataset, selection: PlotSelection) -> F
 def _build_panel_arguments(dataset: xr.Dataset, selection: PlotSelection) -> dict[str, Any]:
     """Return the arguments of ``rsfstudy.Panel`` for the curves of a selection."""
     options: dict[str, Any] = {"x": selection.x, "y": selection.variable}
-    options |= {"hue": [selection.second]} if selection.second else {}
+    options |= {"hue": [selection.second_dimension]} if selection.second_dimension else {}
     options |= {"facet": [selection.facet]} if selection.facet else {}
     options |= (
         {"isel": dict(selection.point_index_by_dimension)}
@@ -106,7 +106,7 @@ def format_selection_as_python_code(
     lines.append(f"part = {shown}[{names!r}]{f'.isel({points!r})' if points else ''}")
     lines += ["print(part.to_dataframe())", ""]
     if selection.kind == MAP:
-        plane = f"transpose(..., {selection.second!r}, {selection.x!r})"
+        plane = f"transpose(..., {selection.second_dimension!r}, {selection.x!r})"
         selected = f"{shown}.isel({points!r})" if points else shown
         lines.append(f"figure = rsfstudy.plot({selected}.{plane}, {selection.variable!r})")
     else:

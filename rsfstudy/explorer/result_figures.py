@@ -216,8 +216,8 @@ class CurvesPlot(ResultPlot):
         bars = Whisker(base="x", lower="low", upper="high", source=self.points)
         bars.upper_head.size = bars.lower_head.size = 6
         self.figure.add_layout(bars)
-        mapper = build_colour_mapper_of_dimension(dataset, panel.second)
-        named: Any = {"legend_field": "name"} if panel.second and not mapper else {}
+        mapper = build_colour_mapper_of_dimension(dataset, panel.second_dimension)
+        named: Any = {"legend_field": "name"} if panel.second_dimension and not mapper else {}
         points = self.figure.scatter(
             "x", "y", marker="marker", color="color", size="size", source=self.points,
             nonselection_alpha=0.5, **named,
@@ -227,13 +227,15 @@ class CurvesPlot(ResultPlot):
         self.figure.extra_y_scales = {"status": LinearScale()}
         marks = self.draw_status_symbols(y_range_name="status", nonselection_line_alpha=0.4)
         tips = [("value", "@y{0.000000e+0} ± @error{0.0e+0}"), ("x", "@x{0.000000e+0}")]
-        tips += [("curve", "@name")] * bool(panel.second) + [("status", "@status")]
+        tips += [("curve", "@name")] * bool(panel.second_dimension) + [("status", "@status")]
         self.figure.add_tools(HoverTool(renderers=[points], tooltips=tips))
         self.figure.select_one(TapTool).renderers = [points, marks]
         for source in (self.points, self.marks):
             source.selected.on_change("indices", self._handle_point_selection)
         if mapper:
-            title = convert_mathtext_to_unicode(format_axis_label(dataset, panel.second, 200))
+            title = convert_mathtext_to_unicode(
+                format_axis_label(dataset, panel.second_dimension, 200)
+            )
             bar = ColorBar(color_mapper=mapper, title=title, title_text_font_style="normal")
             self.figure.add_layout(bar, "right")
         set_tick_labels(self.figure.yaxis, find_used_flag_names(dataset, panel.variable))
@@ -278,8 +280,8 @@ def _choose_curve_styles(
     with style_context():
         cycled = [cycle_style(c.index_on_colour_dimension) for c in curves]
     colours, dashes = [s["color"] for s in cycled], [s["linestyle"] for s in cycled]
-    if mapper := build_colour_mapper_of_dimension(dataset, panel.second):
-        points = dataset[panel.second].values.astype(float)
+    if mapper := build_colour_mapper_of_dimension(dataset, panel.second_dimension):
+        points = dataset[panel.second_dimension].values.astype(float)
         colours = [
             find_colour_of_value(mapper, points[c.index_on_colour_dimension]) for c in curves
         ]
@@ -342,12 +344,12 @@ class MapPlot(ResultPlot):
 
     def choose_y_axis_type(self, dataset: xr.Dataset, panel: PlotSelection) -> str:
         """Return "log" if the points along y are spaced logarithmically."""
-        return "log" if is_log_spaced_coordinate(dataset, panel.second) else "linear"
+        return "log" if is_log_spaced_coordinate(dataset, panel.second_dimension) else "linear"
 
     def add_glyphs_and_tools(self, dataset: xr.Dataset, panel: PlotSelection) -> None:
         """Add the image, its colour scale, the symbols of statuses and the tooltips."""
         self.figure.yaxis.axis_label = convert_mathtext_to_unicode(
-            format_axis_label(dataset, panel.second, 200)
+            format_axis_label(dataset, panel.second_dimension, 200)
         )
         self.image = ColumnDataSource({n: [] for n in ("image", "x", "y", "dw", "dh")})
         self.chosen = ColumnDataSource({"x": [], "y": []})

@@ -61,7 +61,7 @@ _SIDE_BY_SIDE_GRID_STYLE = {
 #: Number of points of a dimension above which the cell is chosen by its index.
 _MAX_OPTIONS_OF_SELECT_WIDGET = 100
 _STRETCH_WIDTH_OPTIONS: dict[str, Any] = {"sizing_mode": "stretch_width"}
-_SELECTION_FIELD_NAMES = ("variable", "kind", "x", "second", "facet")
+_SELECTION_FIELD_NAMES = ("variable", "kind", "x", "second_dimension", "facet")
 _LABEL_OF_NO_DIMENSION = "(none)"
 _PLOT_KIND_BY_LABEL = {"Lines": LINES, "Map": MAP}
 
@@ -165,19 +165,21 @@ class ResultsView(ExplorerView):
         others = [d for d in map(str, shown[selection.variable].dims) if d != along]
         nothing = {_LABEL_OF_NO_DIMENSION: ""}
         named = {d: d for d in others if shown.sizes[d] > 1}
-        facets = {d: d for d in named if d != selection.second}
+        facets = {d: d for d in named if d != selection.second_dimension}
         options: dict[str, Any] = {
             "variable": list_plottable_variables(shown),
             "kind": _PLOT_KIND_BY_LABEL if len(plane) > 1 else {"Lines": LINES},
             "x": plane if is_map else list_x_axis_choices(shown, selection.variable),
-            "second": [d for d in plane if d != selection.x] if is_map else nothing | named,
+            "second_dimension": [d for d in plane if d != selection.x]
+            if is_map
+            else nothing | named,
             "facet": nothing | facets,
         }
         self._is_updating = True
         try:
             for key, widget in self._choices.items():
                 widget.param.update(options=options[key], value=getattr(selection, key))
-            self._choices["second"].label = "Vertical axis" if is_map else "Colour"
+            self._choices["second_dimension"].label = "Vertical axis" if is_map else "Colour"
             self._update_dimension_sliders()
         finally:
             self._is_updating = False
@@ -210,7 +212,7 @@ class ResultsView(ExplorerView):
             selection_field: event.new
         }
         if selection_field == "kind":
-            wishes |= {"x": None, "second": None}
+            wishes |= {"x": None, "second_dimension": None}
         with self.show_raised_errors():
             self._show_selection(
                 complete_plot_selection(

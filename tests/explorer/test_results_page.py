@@ -154,7 +154,7 @@ def test_a_click_on_a_map_shows_a_cell_that_failed(open_state, results):
 
 
 def test_downloads_and_code_give_the_numbers(open_state, results, tmp_path, monkeypatch):
-    page = open_state(second="law", points={"stiffness_ratio": 1})
+    page = open_state(second_dimension="law", points={"stiffness_ratio": 1})
     shown = wait_for_points(page, results[VARIABLE].sel(stiffness_ratio=1.2))
     found = run_code(page)
     np.testing.assert_array_equal(found["part"][VARIABLE].values.ravel(), np.float64(shown["y"]))

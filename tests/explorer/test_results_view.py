@@ -24,11 +24,11 @@ VARIABLE = "critical_velocity_ratio"
 
 
 def test_selections_resolve_contradictions(results):
-    chosen = complete_plot_selection(results, x="law", second="law", facet="law")
-    assert (chosen.x, chosen.second) == ("law", "b_over_a")
+    chosen = complete_plot_selection(results, x="law", second_dimension="law", facet="law")
+    assert (chosen.x, chosen.second_dimension) == ("law", "b_over_a")
     assert chosen.point_index_by_dimension == {"stiffness_ratio": 0}
     chosen = complete_plot_selection(results, kind="map", facet="law")
-    assert {chosen.x, chosen.second} == {"stiffness_ratio", "b_over_a"}
+    assert {chosen.x, chosen.second_dimension} == {"stiffness_ratio", "b_over_a"}
     assert (chosen.facet, chosen.point_index_by_dimension) == ("law", {})
 
 
@@ -40,7 +40,7 @@ def test_selections_resolve_contradictions(results):
         ({"points": {"law": 2}}, "law, which has 2 points"),
         ({"points": {"law": 0.5}}, "law, which has 2 points"),
         ({"points": 3}, "must map names"),
-        ({"colour": "law"}, "variable, kind, x, second, facet, points"),
+        ({"colour": "law"}, "variable, kind, x, second_dimension, facet, points"),
         ({"cell": 16}, "from 0 to 15"),
     ],
 )
@@ -50,7 +50,7 @@ def test_an_invalid_state_is_refused(results, setting, message):
 
 
 def test_curves_have_errors_statuses_and_cells(results):
-    panel = complete_plot_selection(results, second="law", points={"stiffness_ratio": 1})
+    panel = complete_plot_selection(results, second_dimension="law", points={"stiffness_ratio": 1})
     for law, curve in enumerate(extract_curves_of_panel(results, panel)):
         part = results.isel(law=law, stiffness_ratio=1)
         assert curve.label == ["slip law", "slowness law"][law]
