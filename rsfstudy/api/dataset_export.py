@@ -16,7 +16,7 @@ from rsfstudy.errors import DataError
 from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.quantities import read_units_or_reference_scale
 from rsfstudy.rig import DatasetUnits, Rig
-from rsfstudy.storage import compare_results_of_same_study
+from rsfstudy.storage import StoredDataset, compare_results_of_same_study
 
 
 def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
@@ -35,7 +35,8 @@ def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
         Table as returned by ``DatasetAccessor.to_dataframe``. If the table would have fewer than
         two rows, no columns are omitted.
     """
-    along = [name for name in ("time",) if name in dataset.dims]
+    is_table = bool(StoredDataset(dataset).table_contents)
+    along = [str(name) for name in dataset.dims if is_table or name == "time"]
     along = list(map(str, dataset["status"].dims)) if "status" in dataset else along
     kept = [name for name, values in dataset.variables.items() if set(values.dims) <= set(along)]
     if along:

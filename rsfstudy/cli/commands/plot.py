@@ -64,9 +64,20 @@ def _draw_figure(
     """Draw the figure of a results file, and return the paths of the new files."""
     from rsfstudy.cli import figure_files
     from rsfstudy.cli.study_options import read_results_file
+    from rsfstudy.reporting import is_hold_table
     from rsfstudy.storage import StoredDataset
 
     dataset = read_results_file(results, command_options.study)
+    if contents := StoredDataset(dataset).table_contents:
+        if not is_hold_table(dataset):
+            remedy = f"Print the table: `rsfstudy show {results}`."
+            raise InvalidValue(
+                "NAME", str(results), f"contains {contents}, which has no figure", remedy=remedy
+            )
+        appearance = command_options.collect_option_values("style", "width")
+        figure = dataset.rsf.plot(**appearance)
+        figure_files.write_figure(figure, figure_path, command_options.style)
+        return [figure_path]
     if StoredDataset(dataset).is_of_single_scene:
         if command_options.variable is not None:
             rule = "applies only to results of a study, but the file contains a motion"
