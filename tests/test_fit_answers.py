@@ -220,3 +220,17 @@ def test_the_aic_is_not_decisive_if_the_standard_errors_are_not_valid() -> None:
     text = last_sentence(white)
     assert "decisive" not in text
     assert "not conclusive, because the AIC requires valid standard errors" in text
+
+
+def test_the_table_always_has_a_column_of_steps() -> None:
+    file = Path(__file__).parents[1] / "studies" / "pages" / "step.csv"
+    record = rsfstudy.read_record(file, normal_stress="20 MPa")
+    about = {"stiffness": "0.04 MPa/um", "laws": ["slowness"]}
+    single = rsfstudy.fit(record, steps=[2], **about).rsf.fit_table()
+    assert single["step"].tolist() == [2]
+    assert single[["V0", "V1"]].values.round().tolist() == [[10.0, 1.0]]
+    both = rsfstudy.fit(record, **about).rsf.fit_table()
+    assert both["step"].tolist() == [1, 2]
+    joint = rsfstudy.fit(record, together=True, **about).rsf.fit_table()
+    assert joint["step"].tolist() == ["1, 2"]
+    assert not {"V0", "V1", "window"} & set(joint)
