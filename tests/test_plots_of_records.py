@@ -92,3 +92,20 @@ def test_other_functions_name_the_function_for_records(step):
         rsfstudy.plot_record(step.to_dataset())
     with pytest.raises(InvalidValue, match="Choices: time, displacement"):
         rsfstudy.plot_record(step, against="slip")
+
+
+def test_the_time_axis_of_a_protocol_does_not_mention_a_single_step():
+    rig = rsfstudy.Rig(
+        normal_stress="20 MPa", stiffness="0.04 MPa/um", slip_distance="12 um",
+        reference_velocity="1 um/s",
+    )  # fmt: skip
+    step = rig.scene(a=0.01, b=0.013, normal_stress="constant", load_velocity="10 um/s")
+    velocities = ["1 um/s", "10 um/s", "1 um/s"]
+    loading = rig.protocol([{"velocity": v, "duration": "1 s"} for v in velocities])
+    protocol = rig.scene(a=0.01, b=0.013, normal_stress="constant", loading=loading)
+    labels = [
+        rsfstudy.simulate(scene, duration=rig.dimensionless("3 s"))
+        .rsf.plot(against="time").axes[1].get_xlabel()
+        for scene in (step, protocol)
+    ]  # fmt: skip
+    assert labels == ["Time since the step ($D_c/V_*$)", "Time ($D_c/V_*$)"]
