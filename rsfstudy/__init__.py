@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from rsfstudy.motion.integrator import Integrator as Integrator
     from rsfstudy.plots._healing import plot_healing as plot_healing
     from rsfstudy.plots._motion import plot_motion as plot_motion
+    from rsfstudy.plots._records import plot_record as plot_record
     from rsfstudy.rig.protocol_files import history as history
     from rsfstudy.rig.protocol_files import read_protocol as read_protocol
     from rsfstudy.rig.record_files import read_record as read_record
@@ -62,6 +63,7 @@ _EXPORTED_NAMES_BY_MODULE = {
     "rig.protocol_files": ("history", "read_protocol"),
     "plots._healing": ("plot_healing",),
     "plots._motion": ("plot_motion",),
+    "plots._records": ("plot_record",),
     "study.study": ("Study",),
     "axes.axis": ("Axis",),
     "study.claims": ("Claim",),

@@ -1,6 +1,7 @@
 """Tests of the width, style, header and text sizes of figures."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from rsfstudy.plots import corner_plots, fits
 from rsfstudy.status import Status
 from rsfstudy.storage import write_dataset
 
+HOLDS = Path(__file__).parents[1] / "studies" / "pages" / "holds.csv"
 MM = 25.4
 RATES = Axis("load_velocity_ratio", np.geomspace(1e-4, 1e4, 9))
 ANGLES = Axis("phi", [45.0, 60.0, 75.0])
@@ -57,10 +59,11 @@ def draw(request, motion, holds, results):
         "study": results.rsf.plot,
         "map": lambda **about: lattice(ANGLES, RATES).rsf.plot(**about),
         "healing": lambda **about: rsfstudy.plot_healing(holds, **about),
+        "record": lambda **about: rsfstudy.plot_record(rsfstudy.read_record(HOLDS), **about),
     }[request.param]
 
 
-@pytest.mark.parametrize("draw", ["motion", "study", "map", "healing"], indirect=True)
+@pytest.mark.parametrize("draw", ["motion", "study", "map", "healing", "record"], indirect=True)
 @pytest.mark.parametrize("width", ["85 mm", "18 cm", 0.12])
 def test_figures_have_the_requested_width_and_style(draw, width):
     drawn = draw(width=width, style={"axes.facecolor": "#123456"})

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import synthetic_records as synthetic
+import xarray as xr
 from scipy.stats import t as student
 from synthetic_records import (
     EXACT_PARAMETERS,
@@ -27,6 +28,8 @@ from rsfstudy.fitting.recorded_loading import build_loading_history
 from rsfstudy.fitting.window_model import LOADING_STEP_SHIFT_OVER_STANDARD_ERROR, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.integrator import Integrator
+from rsfstudy.reporting import build_summary_tables_and_sentences
+from rsfstudy.status import Status
 
 WHITE = {**FIT_OPTIONS, "noise": "white", "laws": ["slowness"]}
 #: True values of the parameters that are not free.
@@ -199,3 +202,35 @@ def test_basalt_is_what_the_page_tells() -> None:
         assert float(fit[f"{name}_stderr"] / usual[f"{name}_stderr"]) == pytest.approx(2.2, abs=0.3)
     assert float(fit.slip_distance) == pytest.approx(8.7, abs=0.1)
     assert float(fit.a) == pytest.approx(0.0094, abs=1e-4)
+
+
+def test_the_aic_is_not_decisive_if_the_standard_errors_are_not_valid() -> None:
+    file = Path(__file__).parents[1] / "studies" / "pages" / "step.csv"
+    record = rsfstudy.read_record(file, normal_stress="20 MPa")
+    about = {"stiffness": "0.04 MPa/um", "steps": [1], "after": "200 um"}
+
+    def last_sentence(fits: xr.Dataset) -> str:
+        texts = list(build_summary_tables_and_sentences(fits))
+        return next(text for text in texts if isinstance(text, str) and "AIC" in text)
+
+    valid = rsfstudy.fit(record, **about)
+    assert last_sentence(valid).startswith("slowness fits best: its AIC is lower by")
+    white = rsfstudy.fit(record, noise="white", **about)
+    assert (white["status"] == Status.ERRORS_NOT_VALID).any()
+    text = last_sentence(white)
+    assert "decisive" not in text
+    assert "not conclusive, because the AIC requires valid standard errors" in text
+
+
+def test_the_table_always_has_a_column_of_steps() -> None:
+    file = Path(__file__).parents[1] / "studies" / "pages" / "step.csv"
+    record = rsfstudy.read_record(file, normal_stress="20 MPa")
+    about = {"stiffness": "0.04 MPa/um", "laws": ["slowness"]}
+    single = rsfstudy.fit(record, steps=[2], **about).rsf.fit_table()
+    assert single["step"].tolist() == [2]
+    assert single[["V0", "V1"]].values.round().tolist() == [[10.0, 1.0]]
+    both = rsfstudy.fit(record, **about).rsf.fit_table()
+    assert both["step"].tolist() == [1, 2]
+    joint = rsfstudy.fit(record, together=True, **about).rsf.fit_table()
+    assert joint["step"].tolist() == ["1, 2"]
+    assert not {"V0", "V1", "window"} & set(joint)

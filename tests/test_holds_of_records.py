@@ -213,5 +213,9 @@ def test_figure_of_healing() -> None:
     table = rsfstudy.healing(record)
     assert len(rsfstudy.plot_healing(table, record).axes) == 2
     assert len(rsfstudy.plot_healing(table).axes) == 1
+    numbers = {"healing_rate_stderr": 0.000664, "healing_intercept": 0.01}
+    rounded = table.assign(healing_rate=0.0253, **numbers)
+    legend = rsfstudy.plot_healing(rounded).axes[0].get_legend()
+    assert r"0.02530 $\pm$ 0.00066 per decade" in [text.get_text() for text in legend.texts]
     with pytest.raises(DataError, match="not a table of holds"):
         rsfstudy.plot_healing(xr.Dataset())

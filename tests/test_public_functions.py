@@ -130,6 +130,7 @@ def calls(place: Path) -> dict[str, dict]:
         "healing": {"record": xr.load_dataset(place / "held.nc")},
         "plot_healing": {"table": xr.load_dataset(place / "holds.nc")},
         "plot_motion": {"motion": xr.load_dataset(place / "motion.nc")},
+        "plot_record": {"record": record()},
         "to_si": {"dataset": dataset, "normal_stress": 5e6, "slip_distance": 1e-5},
     }
 

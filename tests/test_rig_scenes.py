@@ -60,3 +60,17 @@ def test_the_default_friction_is_reported(tmp_path):
     assert "friction coefficient at V_*, has its default value 0.76" in texts[0]
     assert "default value" not in texts[1]
     assert rig.scene(a=0.01).mu_star == rsfstudy.Scene().mu_star
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("mass", "20 kg", r"mass per fault area, not a mass \(got '20 kg'\).*'1e4 kg/m\^2'"),
+        ("normal_stress", "20 kN", "a stress, not a force.*Divide the force by the fault area"),
+        ("stiffness", "20 kN/mm", "a stress divided by a displacement, not a force.*'0.04 MPa/um'"),
+    ],
+)
+def test_values_must_be_divided_by_the_fault_area(name, value, message):
+    rig = {"normal_stress": "5 MPa", "slip_distance": "10 um", "reference_velocity": "1 um/s"}
+    with pytest.raises(InvalidValue, match=message):
+        Rig(**{**rig, "stiffness": "0.04 MPa/um", name: value})

@@ -70,7 +70,7 @@ class DatasetAccessor:
         """Return the dataset and the verdicts of its claims as HTML."""
         from rsfstudy.api import html_report
 
-        self._require_rsfstudy_dataset()
+        self._require_rsfstudy_dataset_or_table()
         return html_report.format_dataset_as_html(self._dataset)
 
     @property
@@ -267,7 +267,7 @@ class DatasetAccessor:
 
     @raise_only_rsfstudy_errors
     def plot(self, *plot_arguments: Any, **plot_options: Any) -> Figure:
-        """Plot the results of a study, a motion or a limit cycle.
+        """Plot the results of a study, a motion, a limit cycle or a table of holds.
 
         The axes of the figure have the units of the dataset.
 
@@ -276,7 +276,7 @@ class DatasetAccessor:
         *plot_arguments : object
             Positional arguments for ``rsfstudy.plot`` or ``rsfstudy.plot_motion``. The results of a
             study are plotted with ``rsfstudy.plot``. Motions and limit cycles are plotted with
-            ``rsfstudy.plot_motion``.
+            ``rsfstudy.plot_motion``, and tables of holds with ``rsfstudy.plot_healing``.
         **plot_options : object
             Keyword arguments for ``rsfstudy.plot`` or ``rsfstudy.plot_motion``. The arguments
             ``style``, ``width`` and ``header`` apply to all figures. In addition, ``variable``
@@ -293,8 +293,11 @@ class DatasetAccessor:
             If only some cells of a study are selected, or if the dataset cannot be plotted.
         """
         from rsfstudy.api import study_runs
-        from rsfstudy.plots import plot_motion
+        from rsfstudy.plots import plot_healing, plot_motion
+        from rsfstudy.reporting import is_hold_table
 
+        if is_hold_table(self._dataset):
+            return plot_healing(self._dataset, *plot_arguments, **plot_options)
         if self._contains_study_results:
             self._require_all_axes_present("figures show")
             return study_runs.plot(self._dataset, *plot_arguments, **plot_options)
@@ -514,7 +517,7 @@ class DatasetAccessor:
         """
         from rsfstudy.api.dataset_export import to_dataframe
 
-        self._require_rsfstudy_dataset()
+        self._require_rsfstudy_dataset_or_table()
         return to_dataframe(self._dataset, decoded)
 
     @raise_only_rsfstudy_errors
@@ -633,6 +636,13 @@ class DatasetAccessor:
         """Raise ``DataError`` if rsfstudy has not created the dataset."""
         if not {"scene", "declaration"} & set(self._dataset.attrs):
             raise DataError(_NOT_AN_RSFSTUDY_DATASET_MESSAGE)
+
+    def _require_rsfstudy_dataset_or_table(self) -> None:
+        """Raise ``DataError`` unless the dataset is a table or another dataset of rsfstudy."""
+        from rsfstudy.storage import StoredDataset
+
+        if not StoredDataset(self._dataset).table_contents:
+            self._require_rsfstudy_dataset()
 
     def _require_all_axes_present(self, requested_action: str) -> None:
         """Raise ``DataError`` if a selection has removed an axis."""

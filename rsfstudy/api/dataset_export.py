@@ -17,7 +17,7 @@ from rsfstudy.errors import DataError
 from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.quantities import read_units_or_reference_scale
 from rsfstudy.rig import DatasetUnits, Rig
-from rsfstudy.storage import compare_results_of_same_study
+from rsfstudy.storage import StoredDataset, compare_results_of_same_study
 
 
 def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
@@ -41,7 +41,8 @@ def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
     The columns must not depend on the results of the cells. The status and the other data variables
     are therefore columns even if they are constant or NaN in all cells.
     """
-    along = [name for name in ("time",) if name in dataset.dims]
+    is_table = bool(StoredDataset(dataset).table_contents)
+    along = [str(name) for name in dataset.dims if is_table or name == "time"]
     along = list(map(str, dataset["status"].dims)) if "status" in dataset else along
     kept = [name for name, values in dataset.variables.items() if set(values.dims) <= set(along)]
     if along:

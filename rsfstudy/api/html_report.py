@@ -42,6 +42,7 @@ from rsfstudy.reporting import (
     count_cells_by_status,
     count_pending_cells,
     describe_dataset_origin,
+    is_hold_table,
     summarise_verdicts_and_failures,
 )
 from rsfstudy.status import Status
@@ -82,8 +83,8 @@ def report(
     Parameters
     ----------
     directory : str or Path, default: "outputs"
-        Directory with results of studies, fits and motions (files with the suffix ``.nc`` or
-        ``.zarr``). Files that cannot be read are listed in the report with the reason.
+        Directory with results of studies, fits, motions and tables of holds (files with the suffix
+        ``.nc`` or ``.zarr``). Files that cannot be read are listed in the report with the reason.
     output : str or Path, optional
         Path of the page, with the suffix ``.html``. The default is ``report.html`` in the
         directory.
@@ -215,7 +216,9 @@ def _build_section_of_file(results_path: Path, page_directory: Path) -> _ReportS
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            found = _build_section_of_dataset(results_path, read_dataset(results_path))
+            found = _build_section_of_dataset(
+                results_path, read_dataset(results_path, allow_tables=True)
+            )
         except Exception as error:  # Damaged files raise many types of exceptions.
             why = str(error) if isinstance(error, RsfStudyError) else format_exception(error)
             found = _ReportSectionOfFile(
@@ -238,6 +241,9 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Repor
     title = str(dataset.attrs.get("title", "result for one scene"))
     numbers = format_dataset_as_html(dataset)
     # The module uses the accessor without an import, because the accessor imports this module.
+    if StoredDataset(dataset).table_contents:
+        parts = [_format_figure_as_html(results_path, dataset.rsf.plot)] * is_hold_table(dataset)
+        return _ReportSectionOfFile(results_path, title, html_parts=(*parts, numbers))
     if StoredDataset(dataset).is_of_single_scene:
         figure = (
             _format_figure_as_html(results_path, dataset.rsf.plot)
@@ -295,7 +301,7 @@ def format_dataset_as_html(dataset: xr.Dataset) -> str:
     parts = list(
         map(_format_table_or_sentence_as_html, build_summary_tables_and_sentences(dataset))
     )
-    if StoredDataset(dataset).is_of_single_scene:
+    if StoredDataset(dataset).is_of_single_scene or StoredDataset(dataset).table_contents:
         parts.append(_format_table_or_sentence_as_html(describe_dataset_origin(dataset)))
     elif claimed := build_claims_table(study_runs.check(dataset)):
         parts += ["<h3>Claims</h3>", _format_table_or_sentence_as_html(claimed)]

@@ -34,6 +34,7 @@ from rsfstudy.execution import (
     collect_run_fingerprint,
     prepare_study_run,
 )
+from rsfstudy.fitting import Record
 from rsfstudy.measures import Outcome
 from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
@@ -483,6 +484,7 @@ def plot(
     See Also
     --------
     rsfstudy.plot_motion : Plot a motion or a limit cycle.
+    rsfstudy.plot_record : Plot a laboratory record.
 
     Examples
     --------
@@ -501,6 +503,9 @@ def plot(
     """
     from rsfstudy.plots import draw_figure
 
+    if isinstance(dataset, Record):
+        remedy = "Call rsfstudy.plot_record(record)."
+        raise InvalidValue("dataset", dataset, "must not be a record", remedy=remedy)
     dataset = _open_dataset_if_name_or_path(dataset)
     return draw_figure(
         dataset, user_figure, variable=variable, style=style, width=width, header=header

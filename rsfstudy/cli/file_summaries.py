@@ -1,4 +1,4 @@
-"""Summary of a file that contains results, fits, a motion or a single scene."""
+"""Summary of a file that contains results, fits, a table, a motion or a single scene."""
 
 from __future__ import annotations
 
@@ -45,6 +45,8 @@ class FileSummary(CommandResult):
             succeeded = StudyResults(self.dataset, self.file_path).is_complete_without_failures
         elif kind == "fit":
             succeeded = are_all_fits_valid(self.dataset)
+        elif kind == "table":
+            succeeded = True
         else:
             succeeded = self.dataset.attrs["status"] == Status.OK.label
         return EXIT_STATUS_OK if succeeded else EXIT_STATUS_FAILED

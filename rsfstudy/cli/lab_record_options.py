@@ -19,6 +19,9 @@ from rsfstudy.errors import InvalidValue
 #: Names of command-line options that are passed unchanged to the functions that read records.
 _OPTIONS_PASSED_TO_RECORD_READERS = ("decimal", "sheet", "area", "begin", "end", "thin", "filter")
 
+#: Names of all command-line options that determine how a record is read.
+NAMES_OF_RECORD_OPTIONS = ("columns", "normal_stress", "rows", *_OPTIONS_PASSED_TO_RECORD_READERS)
+
 
 def _parse_number_or_text(
     _context: click.Context, _option: click.Parameter, text: str | None

@@ -141,4 +141,4 @@ def read_results_file(file: Path, study_file: Path | None) -> xr.Dataset:
     """
     if study_file is not None:
         load_study(str(study_file))
-    return read_dataset(file)
+    return read_dataset(file, allow_tables=True)

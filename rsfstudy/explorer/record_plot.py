@@ -26,6 +26,8 @@ from rsfstudy.reporting import split_into_single_fits
 
 #: Width of a figure in pixels before the browser reports the actual width.
 _ASSUMED_FIGURE_WIDTH_PIXELS = 900
+#: Widths below this number of pixels are ignored, because the browser has not drawn the figure.
+_MIN_FIGURE_WIDTH_PIXELS = 50
 #: Largest distance between a click and a step, as a fraction of the visible range.
 _MAX_CLICK_DISTANCE_OVER_X_RANGE = 0.02
 #: Margin on both sides of the record, as a fraction of the visible range.
@@ -321,9 +323,11 @@ class RecordPlot:
     def _get_horizontal_pixel_count(self) -> int:
         """Return the number of pixels between the ends of the horizontal axis."""
         try:
-            return int(self.figures["friction"].inner_width)
+            width = int(self.figures["friction"].inner_width)
         except UnsetValueError:  # The browser has not drawn the figure yet.
             return _ASSUMED_FIGURE_WIDTH_PIXELS
+        # The browser reports a width close to 0 while the figure is hidden.
+        return width if width >= _MIN_FIGURE_WIDTH_PIXELS else _ASSUMED_FIGURE_WIDTH_PIXELS
 
     def _handle_zoom(self, event: RangesUpdate) -> None:
         """Thin the rows again after the user has changed the visible range."""

@@ -35,6 +35,9 @@ from rsfstudy.rig import read_record
 _FILE_READING_CHOICES = ("columns", "decimal", "normal_stress")
 #: Keys of a state that are not fields of ``FitChoices``.
 _X_KEY, _FITTED_KEY = "x", "fitted"
+#: Argument in the messages about decimal commas, and the remedy on the page.
+_DECIMAL_ARGUMENT = "decimal=','"
+_DECIMAL_REMEDY = "On this page, select ',' as the Decimal separator in the card Columns."
 
 
 class RecordView(ExplorerView):
@@ -59,6 +62,11 @@ class RecordView(ExplorerView):
         self._excluded: tuple[float, ...] = ()
         self._is_updating = False
         self._widgets = create_fit_choice_widgets()
+        self._columns_card = pn.Card(
+            *(self._widgets[name] for name in ("columns", "decimal")),
+            title="Columns",
+            collapsed=True,
+        )
         self._x = pn.widgets.RadioButtonGroup(
             label="Horizontal axis", value="time",
             options={"Time": "time", "Displacement": "displacement"},
@@ -80,13 +88,10 @@ class RecordView(ExplorerView):
         """Return the widgets in the left column."""
         named = self._widgets
         details = [named[n] for n in ("slip_distance", "before", "after", "noise", "loading")]
-        reading = pn.Card(
-            *(named[name] for name in ("columns", "decimal")), title="Columns", collapsed=True
-        )
         return [
             pn.pane.Markdown("Drag in a plot to choose the window. Click a step to exclude it."),
             self._x,
-            reading,
+            self._columns_card,
             named["normal_stress"],
             pn.Row(named["begin"], named["end"]),
             self._whole_button,
@@ -178,6 +183,9 @@ class RecordView(ExplorerView):
             try:
                 self._record = read_record(self.source, **self._reading)
             except InvalidValue as error:
+                if _DECIMAL_ARGUMENT in str(error):
+                    self._columns_card.collapsed = False
+                    raise DataError(f"{error} {_DECIMAL_REMEDY}") from error
                 if error.name != "slip":
                     raise
                 self._reading = self.fit_choices.add_stiffness_for_slip_record(self._reading)

@@ -199,7 +199,9 @@ def _yield_warning_if_residuals_correlate(fit_solution: FitSolution) -> Iterator
     if p_value < WHITENESS_TEST_SIGNIFICANCE_LEVEL:
         yield (
             f"the whitened residuals are still autocorrelated (p = {p_value:.2g}), so the law, "
-            "the trend or the noise model does not describe the record"
+            "the trend or the noise model does not describe the record. Compare another law, add "
+            "a curved trend or use a shorter window. If the noise is periodic, remove the "
+            "oscillation from the record first"
         )
 
 

@@ -26,6 +26,7 @@ from rsfstudy.fitting.normal_stress_steps import (
     set_normal_stresses_of_steps,
 )
 from rsfstudy.fitting.velocity_steps import LoadingStep, detect_velocity_steps
+from rsfstudy.formatting import format_count_with_noun
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import Quantity, is_valid_variable_name
 
@@ -144,6 +145,22 @@ class Record:
         for name in sorted(self.columns):
             told.update(np.ascontiguousarray(self.columns[name]).tobytes())
         return told.hexdigest()[:16]
+
+    def __repr__(self) -> str:
+        """Return a line with the name, the number of rows, the columns and the number of steps."""
+        units = {about.name: about.units for about in RECORD_COLUMNS}
+        columns = ", ".join(
+            name if units[name] == "1" else f"{name} ({units[name]})" for name in self.columns
+        )
+        lines = [
+            f"{len(self):,} rows from {self.time[0]:.6g} to {self.time[-1]:.6g} s"
+            if len(self)
+            else "no rows",
+            columns,
+            format_count_with_noun(len(self.loading_steps), "step"),
+            *self.processing,
+        ]
+        return f"<Record '{self.name}': {'; '.join(lines)}>"
 
     def __eq__(self, other: object) -> bool:
         """Return True if two records have equal names and equal digests."""

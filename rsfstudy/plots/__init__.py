@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rsfstudy.plots._healing import plot_healing
     from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
     from rsfstudy.plots._motion import plot_motion
+    from rsfstudy.plots._records import plot_record
     from rsfstudy.plots._reference_agreement import draw_agreement
     from rsfstudy.plots._style import (
         add_grey_legend_entry,
@@ -51,6 +52,7 @@ else:
             "plots._healing": ("plot_healing",),
             "plots._image_files": ("Figure", "NotebookFigure", "render_figure", "write_image"),
             "plots._motion": ("plot_motion",),
+            "plots._records": ("plot_record",),
             "plots._style": (
                 "add_grey_legend_entry",
                 "cycle_marker",
@@ -80,6 +82,7 @@ __all__ = [
     "label_rows",
     "plot_healing",
     "plot_motion",
+    "plot_record",
     "render_figure",
     "save_figure",
     "style_context",

@@ -142,7 +142,8 @@ def _draw_healing_against_hold_duration(hold_table: xr.Dataset, axes: Axes) -> N
     )
     if math.isfinite(rate):
         ends = np.array([duration.min(), duration.max()])
-        label = rf"{rate:.3g} $\pm$ {stderr:.2g} per decade"
+        digits = 4 if not stderr > 0.0 else max(0, 1 - math.floor(math.log10(stderr)))
+        label = rf"{rate:.{digits}f} $\pm$ {stderr:.{digits}f} per decade"
         axes.plot(ends, level + rate * np.log10(ends), label=label, **cycle_style(0))
     if duration.min() < duration.max():
         set_log_scale(axes, "x")

@@ -131,7 +131,7 @@ def plot_motion(
             upper.set_ylabel(_format_axis_label_of_variable(stress))
         upper.tick_params(labelbottom=False)
         _draw_slip_rate(shown, lower, against)
-        lower.set_xlabel(_format_axis_label_of_variable(shown[against]))
+        lower.set_xlabel(_format_x_label(motion, shown[against]))
         _draw_phase_plane(motion, shown, plane)
         add_panel_letters(figure.axes)
         if header:
@@ -287,6 +287,16 @@ def _format_axis_label_of_variable(variable: xr.DataArray) -> str:
     units = str(variable.attrs.get("scale", variable.attrs.get("units", "1")))
     scales = {"D_c": "$D_c$", "D_c/V_*": "$D_c/V_*$", "sigma_*": r"$\sigma_*$"}
     return f"{name} ({scales.get(units, _format_units(units))})"
+
+
+def _format_x_label(motion: xr.Dataset, x_variable: xr.DataArray) -> str:
+    """Return the label of the x axis.
+
+    A protocol may have several steps, so the label of its time does not mention a single step.
+    """
+    label = _format_axis_label_of_variable(x_variable)
+    has_protocol = bool(StoredDataset(motion).scene_fields.get("loading"))
+    return label.replace("Time since the step", "Time") if has_protocol else label
 
 
 def _format_units(units: str) -> str:

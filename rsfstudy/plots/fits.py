@@ -208,11 +208,15 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
             min(max(windows) + beside, float(np.max(record[0])) + pad),
         )
         _set_y_limits_to_visible_lines(axes)
-    # The bands have the colours of the laws, so the legend entry is grey.
     said = rf"$\pm${_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS:g} standard errors"
     if not all_have_bands:
         said += ", if identified"
-    add_grey_legend_entry(axes, said, {"linewidth": 5.0, "alpha": 0.3})
+    patch = {"linewidth": 5.0, "alpha": 0.3}
+    if dataset.sizes["law"] == 1:
+        patch["color"] = cycle_style(0)["color"]
+    else:  # The bands have the colours of the laws, so the legend entry is grey.
+        said += " (bands)"
+    add_grey_legend_entry(axes, said, patch)
 
 
 def _is_identified(fit: xr.Dataset) -> bool:

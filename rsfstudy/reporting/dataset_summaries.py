@@ -17,6 +17,7 @@ from rsfstudy.fitting import EVENT_QUANTITIES
 from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.reporting import dataset_origin_descriptions, fit_tables
 from rsfstudy.reporting.fit_summaries import summarise_fits
+from rsfstudy.reporting.hold_summaries import is_hold_table, summarise_holds
 from rsfstudy.reporting.lattice_tables import build_primary_output_table
 from rsfstudy.reporting.reduction_tables import (
     build_reduction_tables,
@@ -53,6 +54,8 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
     """
     if fit_tables.contains_fits(dataset):
         yield from summarise_fits(dataset)
+    elif StoredDataset(dataset).table_contents:
+        yield from _summarise_table(dataset)
     elif not StoredDataset(dataset).is_of_single_scene:
         yield build_primary_output_table(dataset)
         yield from build_reduction_tables(dataset)
@@ -70,6 +73,39 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
             yield f"stability and events are unavailable: {error}"
     else:
         yield build_single_scene_result_table(dataset)
+
+
+def _summarise_table(dataset: xr.Dataset) -> Iterator[SummaryTableOrSentence]:
+    """Yield the summary of a table of holds, events, steps or other rows."""
+    if is_hold_table(dataset):
+        yield from summarise_holds(dataset)
+        return
+    if "cut" in dataset and "slip_rate_threshold" in dataset.attrs:
+        yield build_events_table(dataset)
+        return
+    scalars = [name for name, values in dataset.data_vars.items() if not values.dims]
+    if scalars:
+        yield {str(name): _format_table_value(dataset[name]) for name in scalars}
+    (along,) = dataset.dims
+    names = [along, *(n for n, values in dataset.variables.items() if n != along and values.dims)]
+    heads = {n: dataset[n].attrs.get("units", "1") for n in names if n in dataset.variables}
+    heads = {n: str(n) if unit == "1" else f"{n} ({unit})" for n, unit in heads.items()}
+    count = dataset.sizes[along]
+    shown = min(count, MAX_ROWS_IN_THINNED_TABLE)
+    rows = [
+        {head: _format_table_value(dataset[n][row]) for n, head in heads.items()}
+        for row in range(shown)
+    ]
+    yield TextTable(rows, f"first {shown} of {count:,} rows" if shown < count else "")
+
+
+def _format_table_value(value: xr.DataArray) -> str:
+    """Format a number or a string of a table. NaN is formatted as a dash."""
+    if value.dtype.kind in "iu":
+        return str(value.item())
+    if value.dtype.kind == "f":
+        return format_number_or_dash(float(value), ".6g")
+    return str(value.item())
 
 
 def build_motion_tables_and_sentences(
@@ -126,6 +162,8 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
     dict of str to str
         Descriptions of the scene or the lattice, the command, the versions and the status.
     """
+    if StoredDataset(dataset).table_contents:
+        return _describe_command_and_versions(dataset)
     if not StoredDataset(dataset).is_of_single_scene:
         return dataset_origin_descriptions.describe_study_origin(dataset)
     about, scene = dataset.attrs, StoredDataset(dataset).scene_fields
@@ -133,9 +171,17 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
     rig = StoredDataset(dataset).read_json_attribute("laboratory") if "laboratory" in about else {}
     return {
         **dataset_origin_descriptions.describe_scene_and_rig_fields("scene", fields, rig),
+        **_describe_command_and_versions(dataset),
+        "status": f"{about['status']} {about.get('message', '')}".strip(),
+    }
+
+
+def _describe_command_and_versions(dataset: xr.Dataset) -> dict[str, str]:
+    """Describe the command and the software versions that produced a dataset."""
+    about = dataset.attrs
+    return {
         "command": about.get("history", "unknown"),
         "software versions": about.get("source", "unknown"),
-        "status": f"{about['status']} {about.get('message', '')}".strip(),
     }
 
 

@@ -92,13 +92,26 @@ def _describe_unfitted_step(record_and_step: str, fits: Sequence[xr.Dataset]) ->
 def _compare_laws_by_aic(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Yield a sentence that names the law with the lowest AIC.
 
-    The sentence also states whether the AIC of the second-best law is significantly higher.
+    The sentence also states whether the AIC of the second-best law is significantly higher. If the
+    standard errors of one of both laws are not valid, the noise model is wrong and the difference
+    cannot be interpreted.
     """
+    invalid = {
+        str(one["law"].item())
+        for one in fits
+        if find_status_label_of_fit(one) == Status.ERRORS_NOT_VALID.label
+    }
     known = [(one["aic"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))
     if len(known) > 1:
-        (best, law), (next_best, _other) = known[:2]
+        (best, law), (next_best, second) = known[:2]
         by = next_best - best
+        if {law, second} & invalid:
+            yield (
+                f"{law} has the lowest AIC, by {by:.1f}, but the difference is not conclusive, "
+                "because the AIC requires valid standard errors"
+            )
+            return
         enough = (
             "decisive"
             if by >= _DECISIVE_AIC_DIFFERENCE

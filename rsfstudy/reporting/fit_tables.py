@@ -19,6 +19,7 @@ from rsfstudy.former_data_names import TableAcceptingFormerColumnNames, rename_f
 from rsfstudy.quantities import read_units_or_reference_scale
 from rsfstudy.reporting.text_tables import format_units
 from rsfstudy.status import Status
+from rsfstudy.storage import StoredDataset
 
 #: Names that laboratories use for parameters, by parameter name in rsfstudy. The mapping contains
 #: only the parameters whose names differ.
@@ -170,6 +171,8 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         Table with one row per fit. Lengths are in um. Parameters that were not fitted are NaN. The
         dictionary ``attrs["units"]`` contains the units of each numerical column.
 
+        - ``step`` is the number of the step. For a joint fit, ``step`` is a string with the numbers
+          of all steps, and the table has no columns ``V0``, ``V1`` and ``window``.
         - Columns ``<name>_stderr`` contain standard errors. The standard errors of a row with the
           status ``errors_not_valid`` are not valid.
         - Columns ``<name>_ci_low`` and ``<name>_ci_high`` contain the ends of the 95 % confidence
@@ -187,18 +190,19 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     """
     rows = []
     units: dict[str, str] = {}
+    step, joint_steps = _read_declared_steps(dataset)
     for one in split_into_single_fits(dataset):
         row: dict[str, Any] = dict(find_record_and_step_of_fit(one))
+        row.setdefault("step", step)
         for name, short in find_parameter_headings(one).items():
             for suffix in ("", "_stderr", "_ci_low", "_ci_high", "_windows"):
                 if f"{name}{suffix}" in one:
                     row[f"{short}{suffix}"] = one[f"{name}{suffix}"].item()
                     units[f"{short}{suffix}"] = read_units_or_reference_scale(one[name].attrs)
         for short, name in (("V0", "velocity_before"), ("V1", "velocity_after")):
-            row[short], units[short] = (
-                one[name].item(),
-                read_units_or_reference_scale(one[name].attrs),
-            )
+            if not joint_steps:
+                row[short] = one[name].item()
+                units[short] = read_units_or_reference_scale(one[name].attrs)
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
         stresses = find_normal_stresses_in_mpa(one)
         row |= stresses
@@ -210,8 +214,9 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
             units |= dict.fromkeys(
                 ("k", "k_stderr"), read_units_or_reference_scale(one["window_stiffness"].attrs)
             )
-        ends = [one[f"window_{end}"].item() for end in ("begins", "ends")]
-        row["window"] = " to ".join(f"{x:g}" for x in ends if math.isfinite(x))
+        if not joint_steps:
+            ends = [one[f"window_{end}"].item() for end in ("begins", "ends")]
+            row["window"] = " to ".join(f"{x:g}" for x in ends if math.isfinite(x))
         row["R2"], row["aic"] = one["r_squared"].item(), one["aic"].item()
         row["p_value"], row["status"] = one["p_value"].item(), find_status_label_of_fit(one)
         rows.append(row)
@@ -220,6 +225,23 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         str(name): units.get(str(name), "1") for name in table if table[name].dtype.kind in "iuf"
     }
     return table
+
+
+def _read_declared_steps(dataset: xr.Dataset) -> tuple[int | str, bool]:
+    """Return the steps of a fit without the dimension step, and True for a joint fit.
+
+    The steps of a joint fit are returned as a string, for example "1, 2". The string is empty if
+    the dataset has no declaration.
+    """
+    if "declaration" not in dataset.attrs:
+        return "", False
+    measure: Any = StoredDataset(dataset).declaration.measure
+    joint = measure.get("together", ())
+    if not joint:
+        return measure.get("step", ""), False
+    has_one_record = len({record for record, _step in joint}) == 1
+    steps = [f"{step}" if has_one_record else f"{step} of {record}" for record, step in joint]
+    return ", ".join(steps), True
 
 
 def summarise_fits_as_json_fields(dataset: xr.Dataset) -> list[dict[str, Any]]:

@@ -76,11 +76,14 @@ def classify_file_contents(dataset: xr.Dataset) -> str:
     Returns
     -------
     str
-        The string "results" for the results of a study, "fit" for fits, "motion" for a motion, or
-        "scene" for other results of a single scene.
+        The string "results" for the results of a study, "fit" for fits, "table" for a table of
+        holds, events or steps, "motion" for a motion, or "scene" for other results of a single
+        scene.
     """
     if contains_fits(dataset):
         return "fit"
+    if StoredDataset(dataset).table_contents:
+        return "table"
     if not StoredDataset(dataset).is_of_single_scene:
         return "results"
     return "motion" if is_motion_dataset(dataset) else "scene"
@@ -107,12 +110,19 @@ def summarise_file_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, A
         return about | _summarise_results_as_json_fields(dataset, file)
     if kind == "fit":
         return about | {"fits": summarise_fits_as_json_fields(dataset)}
+    if kind == "table":
+        return about | {"title": dataset.attrs.get("title", ""), "table": _list_table_rows(dataset)}
     about["status"] = dataset.attrs["status"]
     about["message"] = dataset.attrs.get("message", "")
     scene = {"scene": _omit_fields_with_value_none(StoredDataset(dataset).scene_fields)}
     if kind == "motion":
         return about | scene | {"motion": compute_duration_and_peaks_of_motion(dataset)}
     return about | scene | {"values": build_single_scene_result_table(dataset).unformatted_rows}
+
+
+def _list_table_rows(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the values of each variable of a table, as a list or a number."""
+    return {str(name): values.values.tolist() for name, values in dataset.variables.items()}
 
 
 def _summarise_results_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:

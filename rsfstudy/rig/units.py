@@ -76,6 +76,18 @@ _UNIT_PATTERN = re.compile(
 #: a pattern increases with the square of the length of the string.
 _MAX_QUANTITY_TEXT_LENGTH = 200
 _PINT_INSTALL_ADVICE = "Install pint (pip install 'rsfstudy[units]')"
+#: Rule and remedy of the error if a quantity per fault area is not divided by the fault area.
+_RULE_AND_REMEDY_BY_UNITS_PER_AREA = {
+    "Pa": ("must be a stress, not a force", "Divide the force by the fault area."),
+    "Pa/m": (
+        "must be a stress divided by a displacement, not a force divided by a displacement",
+        "Divide the force by the fault area, for example '0.04 MPa/um'.",
+    ),
+    "kg/m^2": (
+        "must be a mass per fault area, not a mass",
+        "Divide the mass by the fault area, for example '1e4 kg/m^2'.",
+    ),
+}
 
 
 def parse_number(text: str) -> float | None:
@@ -273,8 +285,10 @@ def _convert_quantity_text_to_si(quantity_name: str, text: str, si_units: str) -
         _parse_unit_powers(si_units.removeprefix("1")) or []
     )[1]
     if exponents == (wanted[0], wanted[1] + 2, *wanted[2:]):
-        rule = "must be a stress, not a force"
-        raise InvalidValue(quantity_name, text, rule, remedy="Divide the force by the fault area.")
+        for per_area_units, (rule, remedy) in _RULE_AND_REMEDY_BY_UNITS_PER_AREA.items():
+            powers_per_area = _parse_unit_powers(per_area_units) or []
+            if wanted == _compute_si_factor_of_known_units(powers_per_area)[1]:
+                raise InvalidValue(quantity_name, text, rule, remedy=remedy)
     if exponents != wanted:
         raise _build_incompatible_units_error(quantity_name, text, si_units)
     return stated * scale

@@ -221,7 +221,7 @@ def _check_digest_at_file_end(path: Path) -> bool:
     return True
 
 
-def read_dataset(path: Path) -> xr.Dataset:
+def read_dataset(path: Path, *, allow_tables: bool = False) -> xr.Dataset:
     """Read a results file, or a dataset of a single scene.
 
     A NetCDF file is loaded into memory and closed. A Zarr store is opened lazily.
@@ -230,6 +230,8 @@ def read_dataset(path: Path) -> xr.Dataset:
     ----------
     path : Path
         NetCDF file, or directory of a Zarr store.
+    allow_tables : bool, default: False
+        If True, the file may also contain a table of holds, events or steps.
 
     Returns
     -------
@@ -239,7 +241,8 @@ def read_dataset(path: Path) -> xr.Dataset:
     Raises
     ------
     DataError
-        If the file does not exist, cannot be read, is damaged, or was not written by rsfstudy.
+        If the file does not exist, cannot be read, is damaged, or was not written by rsfstudy, or
+        if the file contains a table and ``allow_tables`` is False.
 
     Warns
     -----
@@ -272,6 +275,13 @@ def read_dataset(path: Path) -> xr.Dataset:
         if schema.is_of_single_scene(dataset):
             check_motion_variables_are_numeric(dataset)
             return dataset  # Users save motions with xarray, which writes no digest.
+        if contents := schema.describe_table_contents(dataset):
+            if not allow_tables:
+                raise DataError(
+                    f"the file contains {contents}, not the results of a study. Open the file with "
+                    f"xarray.open_dataset, or print it with `rsfstudy show {where}`."
+                )
+            return dataset
         schema.check_results_dataset(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error

@@ -92,6 +92,15 @@ class StoredProvenance(TypedDict):
     machine: str
 
 
+#: Dimensions of the tables that rsfstudy computes from records and motions, and the contents of
+#: these tables.
+_TABLE_CONTENTS_BY_DIMENSION = {
+    "hold": "a table of holds",
+    "event": "a catalogue of events",
+    "step": "a table of steps",
+    "portion": "the machine stiffness",
+    "time": "a laboratory record",
+}
 #: NumPy dtype kinds that variables may have, and a description of these kinds for error messages.
 _ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or strings")
 _DTYPE_KINDS_OF_REQUIRED_VARIABLES = {
@@ -168,6 +177,27 @@ def is_of_single_scene(dataset: xr.Dataset) -> bool:
         True for a motion, a limit cycle or a critical step, and False for the results of a study.
     """
     return "scene" in dataset.attrs and "declaration" not in dataset.attrs
+
+
+def describe_table_contents(dataset: xr.Dataset) -> str:
+    """Describe a table that rsfstudy has computed from a record or a motion.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset written by rsfstudy.
+
+    Returns
+    -------
+    str
+        Description of the contents, for example "a table of holds". The string is empty if the
+        dataset is not a table, but the results of a study or the dataset of a single scene.
+    """
+    dimensions = [*map(str, dataset.dims)]
+    if len(dimensions) != 1 or not {"scene", "declaration"}.isdisjoint(dataset.attrs):
+        return ""
+    is_from_study = "status" in dataset.variables or "Conventions" not in dataset.attrs
+    return "" if is_from_study else _TABLE_CONTENTS_BY_DIMENSION.get(dimensions[0], "")
 
 
 def check_contains_study_results(dataset: xr.Dataset, file_description: str) -> None:

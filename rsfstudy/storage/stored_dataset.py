@@ -36,6 +36,11 @@ class StoredDataset:
         return schema.is_of_single_scene(self.dataset)
 
     @property
+    def table_contents(self) -> str:
+        """Description of a table of holds, events or steps, or an empty string."""
+        return schema.describe_table_contents(self.dataset)
+
+    @property
     def study_declaration(self) -> StoredStudyDeclaration:
         """Declaration of the study."""
         return schema.read_study_declaration(self.dataset)

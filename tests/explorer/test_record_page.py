@@ -111,6 +111,8 @@ def test_a_newcomer_gets_a_table_files_and_code(shared_page, tmp_path):
     page.get_by_label("Normal stress, if not in the file").fill("20 MPa")
     page.keyboard.press("Enter")
     page.locator("canvas").first.wait_for()
+    place(page, 100.0)  # Wait until the figure has been drawn.
+    assert page.evaluate(CURVE)[0] == len(rsfstudy.read_record(STEP, **READING))
     page.get_by_role("button", name="Fit", exact=True).click()
     page.get_by_text("is required. Pass").wait_for()
     page.get_by_label("Stiffness", exact=True).fill("0.04 MPa/um")

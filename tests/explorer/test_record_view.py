@@ -33,3 +33,15 @@ def test_a_record_of_slip_is_read_with_the_stiffness(tmp_path):
     exec(reading, variables)
     moved = variables["record"].columns["displacement"]
     np.testing.assert_allclose(moved, record.columns["displacement"], atol=1e-9)
+
+
+def test_decimal_commas_open_the_card_of_the_columns(tmp_path):
+    path = tmp_path / "comma.txt"
+    lines = [f"{n},0\t{2 * n},5\t0,6{n % 2}" for n in range(30)]
+    path.write_text("\n".join(["Time (s)\tLP displacement (um)\tFriction", *lines]))
+    view = RecordView.create_with_widget_state(path, {})
+    assert "select ',' as the Decimal separator in the card Columns" in view._alert.object
+    assert not view._columns_card.collapsed
+    read = RecordView.create_with_widget_state(path, {"decimal": ","})
+    assert not read._alert.visible
+    assert len(read._record) == 30

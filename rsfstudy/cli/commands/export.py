@@ -33,7 +33,7 @@ _QUANTITY_ORDER_IN_UNITS_OPTION = ("stress", "length", "time")
     "the input file with the new suffix]",
 )
 def export(command_options: options.CommandOptions) -> int:
-    """Export results or a motion to other programs.
+    """Export results, a motion or a table to other programs.
 
     The command writes a CSV table, a MATLAB file, or both. The CSV table of a study has one row per
     cell. The CSV table of a motion has one row per time.
@@ -46,7 +46,7 @@ def export(command_options: options.CommandOptions) -> int:
     asked = [ending for ending in writers if getattr(command_options, ending)]
     if not asked:
         raise click.UsageError("Pass --csv, --mat, or both.")
-    dataset = read_dataset(command_options.file)
+    dataset = read_dataset(command_options.file, allow_tables=True)
     paths = {
         ending: (command_options.output or command_options.file).with_suffix(f".{ending}")
         for ending in asked

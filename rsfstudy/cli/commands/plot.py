@@ -9,10 +9,16 @@ import click
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import CommandWithOptionsObject
 from rsfstudy.cli.command_results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
+from rsfstudy.cli.lab_record_options import (
+    NAMES_OF_RECORD_OPTIONS,
+    collect_record_reading_options,
+    record_reading_options,
+)
 from rsfstudy.cli.printing import print_line
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue
 from rsfstudy.exception_conversion import check_regular_file
+from rsfstudy.study import list_study_names
 
 
 @click.command(cls=CommandWithOptionsObject)
@@ -30,10 +36,12 @@ from rsfstudy.exception_conversion import check_regular_file
 )
 @options.study_file_option
 @options.abscissa_option
+@record_reading_options
 def plot(command_options: options.CommandOptions) -> int:
-    """Draw the figure of a study or of a motion.
+    """Draw the figure of a study, of a motion or of a record.
 
-    NAME is the name of a study, or a file that contains results or a motion. By default, the
+    NAME is the name of a study, or a file that contains results, a motion, a table of holds or a
+    laboratory record. Records are read with the options of the command ``fit``. By default, the
     command writes the figure to the directory of the file. If the study defines its own figure,
     pass the Python file of the study with --study. The Python file is executed.
     """
@@ -41,6 +49,11 @@ def plot(command_options: options.CommandOptions) -> int:
     from rsfstudy.cli.figure_files import build_default_figure_path
     from rsfstudy.cli.study_options import list_selected_study_names
 
+    if _is_file_of_record(command_options.name):
+        print_line(f"{_draw_record(command_options)}")
+        return EXIT_STATUS_OK
+    if specified := _list_record_options(command_options):
+        raise click.UsageError(f"{', '.join(specified)} can only be used with a record.")
     status, target = EXIT_STATUS_OK, _find_figure_path_in_output_option(command_options)
     for name in list_selected_study_names(command_options):
         results = find_results_file(
@@ -58,15 +71,66 @@ def plot(command_options: options.CommandOptions) -> int:
     return status
 
 
+def _is_file_of_record(name: str | None) -> bool:
+    """Return True if a name is the path of a file that contains neither results nor a study."""
+    if name is None or Path(name).suffix in (".nc", ".zarr", ".py") or not Path(name).is_file():
+        return False
+    return name not in list_study_names()
+
+
+def _list_record_options(command_options: options.CommandOptions) -> list[str]:
+    """Return the specified options that apply only to records."""
+    context = click.get_current_context()
+    return [
+        f"--{name.replace('_', '-')}"
+        for name in NAMES_OF_RECORD_OPTIONS
+        if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
+    ]
+
+
+def _draw_record(command_options: options.CommandOptions) -> Path:
+    """Draw a laboratory record, and return the path of the figure."""
+    import rsfstudy
+    from rsfstudy.cli.figure_files import build_default_figure_path, write_figure
+
+    if command_options.variable is not None or command_options.study is not None:
+        raise click.UsageError("--variable and --study cannot be used with a record.")
+    source, output = Path(command_options.name), command_options.output
+    beside = (source if output is None else output / source.name).with_suffix("")
+    path = _find_figure_path_in_output_option(command_options) or build_default_figure_path(
+        beside, command_options
+    )
+    reading = collect_record_reading_options(command_options)
+    record = rsfstudy.read_record(source, **reading)
+    against = {None: "time", "load_point_displacement": "displacement"}.get(
+        command_options.against, command_options.against
+    )
+    appearance = command_options.collect_option_values("style", "width")
+    figure = rsfstudy.plot_record(record, against=against, **appearance)
+    write_figure(figure, path, command_options.style)
+    return path
+
+
 def _draw_figure(
     results: Path, figure_path: Path, command_options: options.CommandOptions
 ) -> list[Path]:
     """Draw the figure of a results file, and return the paths of the new files."""
     from rsfstudy.cli import figure_files
     from rsfstudy.cli.study_options import read_results_file
+    from rsfstudy.reporting import is_hold_table
     from rsfstudy.storage import StoredDataset
 
     dataset = read_results_file(results, command_options.study)
+    if contents := StoredDataset(dataset).table_contents:
+        if not is_hold_table(dataset):
+            remedy = f"Print the table: `rsfstudy show {results}`."
+            raise InvalidValue(
+                "NAME", str(results), f"contains {contents}, which has no figure", remedy=remedy
+            )
+        appearance = command_options.collect_option_values("style", "width")
+        figure = dataset.rsf.plot(**appearance)
+        figure_files.write_figure(figure, figure_path, command_options.style)
+        return [figure_path]
     if StoredDataset(dataset).is_of_single_scene:
         if command_options.variable is not None:
             rule = "applies only to results of a study, but the file contains a motion"
