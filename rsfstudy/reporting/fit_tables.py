@@ -235,7 +235,7 @@ def _read_declared_steps(dataset: xr.Dataset) -> tuple[int | str, bool]:
     """
     if "declaration" not in dataset.attrs:
         return "", False
-    measure: Any = StoredDataset(dataset).declaration.measure
+    measure: Any = StoredDataset(dataset).study_declaration.measure
     joint = measure.get("together", ())
     if not joint:
         return measure.get("step", ""), False
