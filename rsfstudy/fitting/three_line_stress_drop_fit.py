@@ -57,7 +57,7 @@ HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS = 1.96
 _TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
 #: Smallest number of samples that are required for estimating the stress before a drop, or the
 #: stress after a drop.
-_MIN_SAMPLES_BESIDE_DROP = 3
+MIN_SAMPLES_BESIDE_DROP = 3
 
 
 class FittedStressDrop(NamedTuple):
@@ -205,9 +205,9 @@ def fit_stress_drop(
         stress_after_error=float(of_after + spread),
         stress_drop_error=float(of_drop + spread),
         residual_sd=float(np.sqrt(left * every)),
-        starts_before_record=bool(rows[0] == 0 and (t <= t0).sum() < _MIN_SAMPLES_BESIDE_DROP),
+        starts_before_record=bool(rows[0] == 0 and (t <= t0).sum() < MIN_SAMPLES_BESIDE_DROP),
         ends_after_record=bool(
-            rows[-1] == len(time) - 1 and (t >= t1).sum() <= _MIN_SAMPLES_BESIDE_DROP
+            rows[-1] == len(time) - 1 and (t >= t1).sum() <= MIN_SAMPLES_BESIDE_DROP
         ),
     )
 
