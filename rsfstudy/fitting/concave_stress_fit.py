@@ -42,6 +42,13 @@ _MIN_SIDE_SAMPLES = 16
 #: A concave function does not describe the stress if the mean square of the residuals of the rows
 #: exceeds the variance of the noise by more than this factor.
 _MAX_RESIDUAL_VARIANCE_RATIO = 4.0
+#: Number of samples in a block for the estimate of correlated noise.
+_NOISE_BLOCK_SAMPLES = 8
+#: Smallest significant change of slope in standard errors.
+_MIN_SLOPE_CHANGE_IN_STDERRS = 2.0
+#: If stress decreases throughout, the drop begins where the rate of decrease exceeds this fraction
+#: of the fastest rate.
+_START_RATE_OVER_FASTEST_RATE = 0.1
 #: Smallest coefficient of a change of slope, relative to the range of stress.
 _MIN_SLOPE_CHANGE = 1e-9
 
@@ -51,12 +58,12 @@ class _ConcaveFit(NamedTuple):
 
     Parameters
     ----------
-    times, values, weights : ndarray, shape (rows,)
-        Mean times of the rows, values of the concave function, and numbers of samples.
+    times, row_means, weights : ndarray, shape (rows,)
+        Mean times and stresses of the rows, and numbers of samples.
+    values : ndarray, shape (rows,)
+        Values of the concave function.
     design_matrix : ndarray, shape (rows, parameters)
         Design matrix of a linear fit with the nodes at which the slope changes.
-    corner_row : int
-        Row of the last samples before the drop begins.
     row_variance : float
         Mean square of the residuals of the rows, scaled to the variance of one sample.
     residuals : ndarray, shape (samples,)
@@ -64,23 +71,27 @@ class _ConcaveFit(NamedTuple):
     """
 
     times: np.ndarray
-    values: np.ndarray
+    row_means: np.ndarray
     weights: np.ndarray
+    values: np.ndarray
     design_matrix: np.ndarray
-    corner_row: int
     row_variance: float
     residuals: np.ndarray
 
     @property
-    def degrees_of_freedom(self) -> int:
-        """Number of samples before the drop minus the number of parameters."""
-        return max(len(self.residuals) - self.design_matrix.shape[1], 1)
+    def scaled_residuals(self) -> np.ndarray:
+        """Residuals of the samples, scaled because the parameters reduce their variance."""
+        count = len(self.residuals)
+        freedom = max(count - self.design_matrix.shape[1], 1)
+        return np.asarray(self.residuals * math.sqrt(count / freedom))
 
     def compute_maximum(self, variance: float) -> tuple[float, float, float]:
         """Compute the highest stress.
 
-        Between two rows, the stress may be higher than both values. The concavity limits the
-        stress to the lines through the two preceding rows and through the two following rows.
+        The maximum of the concave function underestimates the stress before a sudden drop, because
+        the function can follow the noise of the last samples downwards. Therefore, the function is
+        also fitted without the changes of slope that are not significant. The result is the middle
+        between the maxima of both functions.
 
         Parameters
         ----------
@@ -90,35 +101,48 @@ class _ConcaveFit(NamedTuple):
         Returns
         -------
         maximum : float
-            Middle between the largest value and the upper limit.
+            Middle between the limits of the highest stress.
         stderr : float
-            Standard error of the largest value.
+            Standard error of the maximum.
         half_range : float
-            Half of the difference between the upper limit and the largest value.
+            Half of the difference between the limits of the highest stress.
         """
-        row = int(np.argmax(self.values))
-        # If stress decreases throughout, there is no maximum, and the drop begins at the corner.
-        row = row or self.corner_row
-        columns = self.design_matrix
+        low, high, stderr = self._find_limits_of_maximum(self.values, self.design_matrix, variance)
+        columns, values = self._remove_insignificant_slope_changes(variance)
+        limits = self._find_limits_of_maximum(values, columns, variance)
+        low, high = min(low, limits[0]), max(high, limits[1])
+        return 0.5 * (low + high), max(stderr, limits[2]), 0.5 * (high - low)
+
+    def _remove_insignificant_slope_changes(self, variance: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the design matrix and the values without insignificant changes of slope."""
+        columns, root = self.design_matrix, np.sqrt(self.weights)
+        while True:
+            inverse = np.linalg.pinv(columns * root[:, None])
+            coefficients = inverse @ (self.row_means * root)
+            stderrs = np.sqrt(variance * np.square(inverse).sum(axis=1))
+            ratios = coefficients[2:] - _MIN_SLOPE_CHANGE_IN_STDERRS * stderrs[2:]
+            if not len(ratios) or ratios.min() >= 0.0:
+                return columns, columns @ coefficients
+            worst = int(np.argmin(coefficients[2:] / np.maximum(stderrs[2:], 1e-300)))
+            columns = np.delete(columns, 2 + worst, axis=1)
+
+    def _find_limits_of_maximum(
+        self, values: np.ndarray, columns: np.ndarray, variance: float
+    ) -> tuple[float, float, float]:
+        """Return the limits of the highest stress, and the standard error of the lower limit.
+
+        Between two rows, the stress may be higher than both values. The concavity limits the
+        stress to the lines through the two preceding rows and through the two following rows.
+        """
+        row = int(np.argmax(values))
+        if row == 0:  # Stress decreases throughout, so there is no maximum before the drop.
+            slopes = np.diff(values) / np.diff(self.times)
+            limit = min(_START_RATE_OVER_FASTEST_RATE * float(slopes[-1]), 0.0)
+            row = int(np.searchsorted(-slopes, -limit, "right"))
         covariance = np.linalg.pinv(columns.T @ (columns * self.weights[:, None]))
         stderr = math.sqrt(max(variance * float(columns[row] @ covariance @ columns[row]), 0.0))
-        highest = max(self._bound_stress_between_rows(row - 1), self._bound_stress_between_rows(row))
-        half_range = 0.5 * max(highest - float(self.values[row]), 0.0)
-        return float(self.values[row]) + half_range, stderr, half_range
-
-    def _bound_stress_between_rows(self, row: int) -> float:
-        """Return the upper limit of a concave function between a row and the next row."""
-        times, values = self.times, self.values
-        if not 0 < row < len(times) - 1:
-            return -math.inf
-        slopes = np.diff(values) / np.diff(times)
-        length, rise = float(times[row + 1] - times[row]), float(slopes[row - 1])
-        at = length
-        if row + 1 < len(slopes):
-            fall = float(slopes[row + 1])
-            bend = max(rise - fall, 1e-300)
-            at = min(max((float(values[row + 1] - values[row]) - fall * length) / bend, 0.0), at)
-        return float(values[row]) + rise * at
+        bounds = (_bound_stress_between_rows(self.times, values, at) for at in (row - 1, row))
+        return float(values[row]), max(float(values[row]), *bounds), stderr
 
 
 def measure_stress_extrema(
@@ -151,22 +175,22 @@ def measure_stress_extrema(
         Fitted drop with the highest stress before the drop, the lowest stress after the drop, and
         their errors.
     residuals : ndarray
-        Residuals of the samples before and after the drop.
+        Residuals of the samples before and after the drop, scaled to the variance of the noise. The
+        array is empty if the record has too few samples on both sides.
     """
     start, end = fitted_drop.start_time, fitted_drop.end_time
     correlation = candidate.stderr_factor_of_correlated_noise
     middle, (previous, following) = 0.5 * (start + end), adjacent_drop_times
     fits = (
-        _fit_longest_concave_part(time, stress, (previous, start, middle), correlation),
-        _fit_longest_concave_part(
-            -time[::-1], -stress[::-1], (-following, -end, -middle), correlation
-        ),
+        _fit_longest_concave_part(time, stress, (previous, start, middle)),
+        _fit_longest_concave_part(-time[::-1], -stress[::-1], (-following, -end, -middle)),
     )
     known = [fit for fit in fits if fit is not None]
-    residuals = np.concatenate([np.empty(0), *(fit.residuals for fit in known)])
-    freedom = sum(fit.degrees_of_freedom for fit in known)
-    squares = float(np.square(residuals).sum()) / max(freedom, 1)
-    variance = max(squares, 0.25 * noise_sd**2) * correlation**2
+    if not known:
+        return fitted_drop, np.empty(0)
+    residuals = np.concatenate([fit.scaled_residuals for fit in known])
+    residual_variance = float(np.square(residuals).mean())
+    variance = max(residual_variance, 0.25 * noise_sd**2) * correlation**2
     stresses = [fitted_drop.stress_before, -fitted_drop.stress_after]
     stderrs, half_ranges = [math.nan] * 2, [math.nan] * 2
     for side, fit in enumerate(fits):
@@ -190,17 +214,12 @@ def measure_stress_extrema(
 
 
 def _fit_longest_concave_part(
-    time: np.ndarray,
-    stress: np.ndarray,
-    limits: tuple[float, float, float],
-    correlation_factor: float,
+    time: np.ndarray, stress: np.ndarray, limits: tuple[float, float, float]
 ) -> _ConcaveFit | None:
     """Fit a concave function to as many samples before a drop as it describes.
 
     The samples extend from the middle between two drops to the middle of the drop. The number of
-    samples before the drop is halved until a concave function describes them within the noise. The
-    noise is estimated from the second differences between the samples, which do not contain the
-    curvature of the stress.
+    samples before the drop is halved until a concave function describes them within the noise.
 
     Parameters
     ----------
@@ -208,8 +227,6 @@ def _fit_longest_concave_part(
         Times and shear stresses of the samples.
     limits : (float, float, float)
         End of the previous drop, and start and middle of this drop.
-    correlation_factor : float
-        Factor by which the correlation of the noise increases the standard error of a mean.
 
     Returns
     -------
@@ -226,12 +243,24 @@ def _fit_longest_concave_part(
     while True:
         part = slice(corner - count, stop)
         fit = _fit_concave_function(time[part], stress[part], count)
-        noise = np.diff(stress[part][:count], 2)
-        # The variance of the second differences of white noise is six times the noise variance.
-        limit = _MAX_RESIDUAL_VARIANCE_RATIO * correlation_factor**2 * np.square(noise).mean() / 6.0
+        limit = _MAX_RESIDUAL_VARIANCE_RATIO * _estimate_noise_variance(stress[part][:count])
         if count < 2 * _MIN_SIDE_SAMPLES or fit.row_variance <= limit:
             return fit
         count //= 2
+
+
+def _estimate_noise_variance(stress: np.ndarray) -> float:
+    """Estimate the variance of the noise from differences that exclude slope and curvature.
+
+    The variance is that of one sample or of the means of blocks, scaled to one sample. The larger
+    variance is returned, because correlation of the noise increases the variance of the means.
+    """
+    variances = []
+    for length in (1, _NOISE_BLOCK_SAMPLES):
+        means = stress[: len(stress) // length * length].reshape(-1, length).mean(axis=1)
+        if len(means) > 2:  # The variance of second differences is six times the noise variance.
+            variances.append(length * float(np.square(np.diff(means, 2)).mean()) / 6.0)
+    return max(variances, default=0.0)
 
 
 def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> _ConcaveFit:
@@ -266,10 +295,10 @@ def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> 
     active = np.flatnonzero(coefficients[4:] > _MIN_SLOPE_CHANGE)
     return _ConcaveFit(
         times=t,
-        values=values,
+        row_means=y,
         weights=weights,
+        values=values,
         design_matrix=np.column_stack([one, scaled, bends[:, active]]),
-        corner_row=int(np.searchsorted(edges, corner)) - 1,
         row_variance=float(norm * size) ** 2 / max(len(t) - len(active) - 2, 1),
         residuals=(stress - np.interp(time, t, values))[:corner],
     )
@@ -282,3 +311,16 @@ def _build_block_edges(count: int) -> np.ndarray:
         length = max(int(_BLOCK_SIZE_OVER_DISTANCE * edges[-1]), 1)
         edges.append(min(edges[-1] + length, count))
     return np.array(edges)
+
+
+def _bound_stress_between_rows(times: np.ndarray, values: np.ndarray, row: int) -> float:
+    """Return the upper limit of a concave function between a row and the next row."""
+    if not 0 < row < len(times) - 1:
+        return -math.inf
+    slopes = np.diff(values) / np.diff(times)
+    at, rise = float(times[row + 1] - times[row]), float(slopes[row - 1])
+    if row + 1 < len(slopes):
+        fall = float(slopes[row + 1])
+        meeting = (float(values[row + 1] - values[row]) - fall * at) / max(rise - fall, 1e-300)
+        at = min(max(meeting, 0.0), at)
+    return float(values[row]) + rise * at

@@ -120,7 +120,9 @@ def _measure_drops(
         drop, left = measure_stress_extrema(time, stress, *of, room, noise)
         measured.append(of._replace(fitted_drop=drop))
         residuals.append(left)
-    noise = min(noise, estimate_robust_sd(np.concatenate(residuals)))
+    pooled = np.concatenate(residuals)
+    if len(pooled):
+        noise = min(noise, estimate_robust_sd(pooled))
     return measured, detection._replace(noise_sd=noise)
 
 
