@@ -231,7 +231,7 @@ def _fit_longest_concave_part(
     Returns
     -------
     _ConcaveFit or None
-        Fit, or None if there are too few samples before the drop.
+        Fit, or None if there are too few samples before the drop or the fit does not converge.
     """
     previous, start, middle = limits
     corner = int(np.searchsorted(time, start, "right"))
@@ -244,7 +244,7 @@ def _fit_longest_concave_part(
         part = slice(corner - count, stop)
         fit = _fit_concave_function(time[part], stress[part], count)
         limit = _MAX_RESIDUAL_VARIANCE_RATIO * _estimate_noise_variance(stress[part][:count])
-        if count < 2 * _MIN_SIDE_SAMPLES or fit.row_variance <= limit:
+        if fit is None or count < 2 * _MIN_SIDE_SAMPLES or fit.row_variance <= limit:
             return fit
         count //= 2
 
@@ -263,7 +263,7 @@ def _estimate_noise_variance(stress: np.ndarray) -> float:
     return max(variances, default=0.0)
 
 
-def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> _ConcaveFit:
+def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> _ConcaveFit | None:
     """Fit a concave function to the samples before the middle of a drop.
 
     Samples are averaged in blocks whose length increases with the distance from the corner.
@@ -274,6 +274,11 @@ def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> 
         Times and shear stresses of the samples.
     corner : int
         Index of the first sample after the beginning of the drop.
+
+    Returns
+    -------
+    _ConcaveFit or None
+        Fit, or None if the algorithm does not converge.
     """
     edges = np.unique(
         np.concatenate(
@@ -288,9 +293,12 @@ def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> 
     one, root = np.ones_like(scaled), np.sqrt(weights)
     # The nonnegative least-squares algorithm requires two columns for a coefficient of any sign.
     columns = np.column_stack([one, -one, scaled, -scaled, bends])
-    coefficients, norm = nnls(
-        columns * root[:, None], (y - centre) / size * root, maxiter=100 * columns.shape[1]
-    )
+    try:
+        coefficients, norm = nnls(
+            columns * root[:, None], (y - centre) / size * root, maxiter=100 * columns.shape[1]
+        )
+    except RuntimeError:  # The number of iterations exceeds the maximum.
+        return None
     values = centre + size * (columns @ coefficients)
     active = np.flatnonzero(coefficients[4:] > _MIN_SLOPE_CHANGE)
     return _ConcaveFit(

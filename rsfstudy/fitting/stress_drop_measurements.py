@@ -302,13 +302,16 @@ def _measure_slip_of_drop(
     if rates[fastest] > noise * norm.isf(FALSE_DETECTION_PROBABILITY / len(rates)):
         error = HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * noise
         row["peak_slip_rate"] = rates[fastest], error + _bound_sampling_error(rates, fastest)
-        # The stress at the peak slip rate is between the stresses of the two samples.
-        ends = stress[fastest : fastest + 2]
-        reading = 0.5 * float(
-            np.ptp(ends)
-        ) + HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * estimate_robust_sd(np.diff(stress))
+        # The slip rate may have its peak in any interval that is as fast within the noise. The
+        # stress at the peak is between the stresses of the samples at the ends of these intervals.
+        first, stop = _find_successive_rates_above(
+            rates, fastest, float(rates[fastest]) - math.sqrt(2.0) * error
+        )
+        at_peak = float(stress[fastest : fastest + 2].mean())
+        reading = float(np.abs(stress[first : stop + 1] - at_peak).max())
+        reading += HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * estimate_robust_sd(np.diff(stress))
         row["dynamic_stress_drop"] = (
-            drop.stress_before - ends.mean(),
+            drop.stress_before - at_peak,
             drop.stress_before_error + reading,
         )
     return row
@@ -333,11 +336,18 @@ def _bound_sampling_error(rates: np.ndarray, fastest: int) -> float:
     float
         Upper limit, or NaN if the sampling does not resolve the peak.
     """
-    slow = np.flatnonzero(rates <= 0.5 * rates[fastest])
-    after = int(np.searchsorted(slow, fastest))
-    first = int(slow[after - 1]) + 1 if after else 0
-    stop = int(slow[after]) if after < len(slow) else len(rates)
+    first, stop = _find_successive_rates_above(rates, fastest, 0.5 * float(rates[fastest]))
     if stop - first < _MIN_INTERVALS_AT_PEAK_SLIP_RATE:
         return math.nan
     beside = rates[[max(fastest - 1, 0), min(fastest + 1, len(rates) - 1)]]
     return max(float(rates[fastest] - beside.mean()), 0.0)
+
+
+def _find_successive_rates_above(
+    rates: np.ndarray, fastest: int, threshold: float
+) -> tuple[int, int]:
+    """Return the range of indices around the largest slip rate that exceed a threshold."""
+    slow = np.flatnonzero(rates <= threshold)
+    after = int(np.searchsorted(slow, fastest))
+    first = int(slow[after - 1]) + 1 if after else 0
+    return first, int(slow[after]) if after < len(slow) else len(rates)
