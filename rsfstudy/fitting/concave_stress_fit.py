@@ -42,8 +42,11 @@ _MIN_SIDE_SAMPLES = 16
 #: A concave function does not describe the stress if the mean square of the residuals of the rows
 #: exceeds the variance of the noise by more than this factor.
 _MAX_RESIDUAL_VARIANCE_RATIO = 4.0
-#: Number of samples in a block for the estimate of correlated noise.
-_NOISE_BLOCK_SAMPLES = 8
+#: Numbers of samples in a block for the estimate of correlated noise. The last length is used only
+#: for standard errors, because the means of long blocks may contain the curvature of stress.
+_NOISE_BLOCK_SIZES = (1, 8, 32)
+#: Smallest number of blocks for the estimate of correlated noise.
+_MIN_NOISE_BLOCKS = 8
 #: Smallest significant change of slope in standard errors.
 _MIN_SLOPE_CHANGE_IN_STDERRS = 2.0
 #: If stress decreases throughout, the drop begins where the rate of decrease exceeds this fraction
@@ -65,7 +68,8 @@ class _ConcaveFit(NamedTuple):
     design_matrix : ndarray, shape (rows, parameters)
         Design matrix of a linear fit with the nodes at which the slope changes.
     row_variance : float
-        Mean square of the residuals of the rows, scaled to the variance of one sample.
+        Mean square of the residuals of the rows, scaled to the variance of one sample. If the
+        variance of the means of blocks of samples is larger, ``row_variance`` is this variance.
     residuals : ndarray, shape (samples,)
         Residuals of the samples before the drop begins.
     """
@@ -243,24 +247,35 @@ def _fit_longest_concave_part(
     while True:
         part = slice(corner - count, stop)
         fit = _fit_concave_function(time[part], stress[part], count)
-        limit = _MAX_RESIDUAL_VARIANCE_RATIO * _estimate_noise_variance(stress[part][:count])
-        if fit is None or count < 2 * _MIN_SIDE_SAMPLES or fit.row_variance <= limit:
-            return fit
+        if fit is None:
+            return None
+        variances = _estimate_noise_variances(stress[part][:count])
+        limit = _MAX_RESIDUAL_VARIANCE_RATIO * max(variances[:-1])
+        if count < 2 * _MIN_SIDE_SAMPLES or fit.row_variance <= limit:
+            return fit._replace(row_variance=max(fit.row_variance, *variances))
         count //= 2
 
 
-def _estimate_noise_variance(stress: np.ndarray) -> float:
-    """Estimate the variance of the noise from differences that exclude slope and curvature.
+def _estimate_noise_variances(stress: np.ndarray) -> list[float]:
+    """Estimate the variance of the noise from second differences.
 
-    The variance is that of one sample or of the means of blocks, scaled to one sample. The larger
-    variance is returned, because correlation of the noise increases the variance of the means.
+    The second differences do not contain the loading rate. Correlation of the noise increases the
+    variance of the means of blocks.
+
+    Returns
+    -------
+    list of float
+        Variances of the means of blocks of 1, 8 and 32 samples, multiplied by the number of samples
+        in a block. The variance is 0 if there are too few blocks.
     """
     variances = []
-    for length in (1, _NOISE_BLOCK_SAMPLES):
+    for length in _NOISE_BLOCK_SIZES:
         means = stress[: len(stress) // length * length].reshape(-1, length).mean(axis=1)
-        if len(means) > 2:  # The variance of second differences is six times the noise variance.
-            variances.append(length * float(np.square(np.diff(means, 2)).mean()) / 6.0)
-    return max(variances, default=0.0)
+        enough = len(means) >= _MIN_NOISE_BLOCKS
+        # The variance of the second differences of white noise is six times the noise variance.
+        squares = np.square(np.diff(means, 2)).mean() / 6.0 if enough else 0.0
+        variances.append(length * float(squares))
+    return variances
 
 
 def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> _ConcaveFit | None:
