@@ -223,9 +223,10 @@ def events(
     maximum of the function. In the same way, ``stress_after`` is the minimum of a convex function
     after the middle of the drop. If no concave or convex function describes these samples, fewer
     samples are used. The errors include the change of stress within a sampling interval. The
-    confidence intervals of ``static_stress_drop`` contain the difference between the highest and
-    the lowest stress of simulated events with a probability of 93 to 100 %, depending on the noise
-    and on the sampling interval.
+    confidence intervals of ``static_stress_drop`` contain the true difference for 93 to 100 % of
+    simulated events in white noise, depending on its size and on the sampling interval. If the
+    record contains events, ``noise`` is estimated from the residuals of the concave and convex
+    functions.
 
     The probability of missing a drop of the size ``smallest_drop`` is 1 in 1,000, provided that no
     other drop is closer to the drop than the length of the longest window. If the noise is white
