@@ -45,6 +45,8 @@ _MAX_RESIDUAL_VARIANCE_RATIO = 4.0
 #: Numbers of samples in a block for the estimate of correlated noise. The last length is used only
 #: for standard errors, because the means of long blocks may contain the curvature of stress.
 _NOISE_BLOCK_SIZES = (1, 8, 32)
+#: Tolerance of times relative to the mean sampling interval.
+_TIME_TOLERANCE = 1e-6
 #: Smallest number of blocks for the estimate of correlated noise.
 _MIN_NOISE_BLOCKS = 8
 #: Smallest significant change of slope in standard errors.
@@ -238,9 +240,12 @@ def _fit_longest_concave_part(
         Fit, or None if there are too few samples before the drop or the fit does not converge.
     """
     previous, start, middle = limits
-    corner = int(np.searchsorted(time, start, "right"))
-    first = int(np.searchsorted(time, max(0.5 * (previous + start), time[0])))
-    stop = min(max(int(np.searchsorted(time, middle, "right")), corner + 1), len(time))
+    # The limits may coincide with samples, so the rounding of times must not decide.
+    tolerance = _TIME_TOLERANCE * (time[-1] - time[0]) / len(time)
+    earliest = 0.5 * (previous + start) - tolerance
+    first = int(np.searchsorted(time, max(earliest, time[0])))
+    corner, stop = (int(np.searchsorted(time, at + tolerance)) for at in (start, middle))
+    stop = min(max(stop, corner + 1), len(time))
     count = corner - first
     if count < MIN_SAMPLES_BESIDE_DROP:
         return None
