@@ -54,6 +54,30 @@ def test_the_command_prints_what_the_function_finds(record: Path) -> None:
     assert found.attrs["processing"] in ran.stdout
 
 
+def test_the_table_marks_lower_bounds_of_slip_rates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sudden drop has an unresolved peak slip rate, and other errors are in the same column."""
+    monkeypatch.chdir(tmp_path)
+    made = record_events.sudden_drops(np.random.default_rng(13))
+    columns = {
+        "Time (s)": made.time,
+        "LP displacement (um)": made.time,
+        "Shear stress (MPa)": made.stress,
+    }
+    pd.DataFrame(columns).to_csv("run.csv", index=False)
+    ran = call_main("events", "run.csv", "--stiffness", "0.05 MPa/um")
+    assert ran.returncode == 0, ran.stderr
+    assert ">= marks a lower bound" in ran.stdout
+    found = rsfstudy.events("run.csv", stiffness="0.05 MPa/um")
+    for row in range(found.sizes["event"]):
+        event = found.isel(event=row)
+        for name in ("slip", "dynamic_stress_drop"):
+            value, error = float(event[name]), float(event[f"{name}_error"])
+            assert f"{value:.4g} +- {error:.2g}" in ran.stdout
+        assert f">= {float(event.peak_slip_rate):.4g}" in ran.stdout
+
+
 def test_wrong_options_of_reading_are_refused(record: Path) -> None:
     ran = call_main("events", "run.csv")
     assert ran.returncode == 2

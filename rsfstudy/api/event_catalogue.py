@@ -32,6 +32,12 @@ _QUANTITIES_REQUIRING_DISPLACEMENT = ("slip", "peak_slip_rate", "dynamic_stress_
 #: Meanings of the codes 0, 1, 2 and 3 of the variable ``cut``.
 _MEANINGS_OF_EVENT_TRUNCATION_FLAGS = ("whole", "begins_before", "lasts_beyond", "both")
 
+#: Comment on the peak slip rate of an event in a record.
+_COMMENT_ON_PEAK_SLIP_RATE = (
+    "largest mean slip rate between two samples. If its error is NaN, the sampling interval is too "
+    "long to resolve the peak, and the value is a lower bound"
+)
+
 #: Limit of the ratio of the largest decrease of stress to the smallest detectable drop of stress.
 #: If no drop is found and the ratio exceeds the limit, the function ``events`` emits a warning.
 _SUSPICIOUS_STRESS_FALL_OVER_MIN_DROP = 10.0
@@ -171,10 +177,12 @@ def events(
         variables are ``duration``, ``interval`` (time since the previous event), ``stress_before``,
         ``stress_after``, ``static_stress_drop`` and ``cut`` (0 for complete events, 1 if the record
         begins within the event, 2 if the record ends within the event, 3 if both apply). If time
-        and displacement are known, the dataset also has ``slip``, ``peak_slip_rate`` between
-        neighbouring samples, and ``dynamic_stress_drop``. Quantities that are not larger than the
-        noise are NaN. For each variable, ``<name>_error`` is the half width of a 95 % confidence
-        interval. The scalar ``noise`` is the standard deviation of the noise, and ``smallest_drop``
+        and displacement are known, the dataset also has ``slip``, ``peak_slip_rate`` (the
+        largest mean slip rate between two samples), and ``dynamic_stress_drop``. Quantities that
+        are not larger than the noise are NaN. For each variable, ``<name>_error`` is the half width
+        of a 95 % confidence interval. The error of ``peak_slip_rate`` is NaN if the sampling
+        interval is too long to resolve the peak. In this case, the value is a lower bound. The
+        scalar ``noise`` is the standard deviation of the noise, and ``smallest_drop``
         is the smallest drop that can be detected. The attribute ``sign_of_shear_stress`` contains
         the sign that was used. The attribute ``processing`` describes the selection of rows and the
         filter.
@@ -208,8 +216,17 @@ def events(
     time.
 
     Three straight lines are then fitted to the samples before, during and after each drop. The
-    intersections of the lines are the beginning of the event, where stress is highest, and the end
-    of the event, where stress is lowest.
+    intersections of the lines are the beginning and the end of the event. Stress may have its
+    maximum before the beginning of the event, because the fault slips slowly before the event. To
+    measure ``stress_before``, the function fits a concave function of time to the samples between
+    the middle of the interval since the previous event and the middle of the drop, and computes the
+    maximum of the function. In the same way, ``stress_after`` is the minimum of a convex function
+    after the middle of the drop. If no concave or convex function describes these samples, fewer
+    samples are used. The errors include the change of stress within a sampling interval. The
+    confidence intervals of ``static_stress_drop`` contain the true difference for 93 to 100 % of
+    simulated events in white noise, depending on its size and on the sampling interval. If the
+    record contains events, ``noise`` is estimated from the residuals of the concave and convex
+    functions.
 
     The probability of missing a drop of the size ``smallest_drop`` is 1 in 1,000, provided that no
     other drop is closer to the drop than the length of the longest window. If the noise is white
@@ -294,6 +311,8 @@ def events(
             NoResultWarning,
             stacklevel=find_stacklevel_of_user_code(),
         )
+    if "peak_slip_rate" in dataset:
+        dataset["peak_slip_rate"].attrs["comment"] = _COMMENT_ON_PEAK_SLIP_RATE
     units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
     dataset["noise"] = (
         (),

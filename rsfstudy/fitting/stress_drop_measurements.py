@@ -32,6 +32,9 @@ from rsfstudy.fitting.three_line_stress_drop_fit import HALF_WIDTH_OF_95_PERCENT
 #: long intervals before and after the drops. The first value is in standard deviations of the
 #: difference. The second value is relative to the displacement before and after the drops.
 _MIN_EXCESS_SLIP_SIGMAS, _MIN_EXCESS_SLIP_FRACTION = 3.0, 0.1
+#: The sampling resolves the peak slip rate if at least this number of successive sampling intervals
+#: have mean slip rates of more than half the largest mean slip rate.
+_MIN_INTERVALS_AT_PEAK_SLIP_RATE = 4
 
 
 class DropSampleIndices(NamedTuple):
@@ -267,7 +270,8 @@ def _measure_slip_of_drop(
     -------
     dict of {str: (float, float)}
         Pairs of a value and its error. The peak slip rate and the dynamic stress drop are NaN if
-        the slip rate does not exceed its noise.
+        the slip rate does not exceed its noise. The error of the peak slip rate is NaN if the value
+        is only a lower bound, because the sampling interval is too long.
     """
     (drop, candidate), (begin, end, window) = detected_and_fitted_drop, sample_indices
     size = drop.stress_before - drop.stress_after
@@ -296,14 +300,54 @@ def _measure_slip_of_drop(
     }
     row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
     if rates[fastest] > noise * norm.isf(FALSE_DETECTION_PROBABILITY / len(rates)):
-        row["peak_slip_rate"] = rates[fastest], HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * noise
-        # The stress at the peak slip rate is between the stresses of the two samples.
-        ends = stress[fastest : fastest + 2]
-        reading = 0.5 * float(
-            np.ptp(ends)
-        ) + HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * estimate_robust_sd(np.diff(stress))
+        error = HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * noise
+        row["peak_slip_rate"] = rates[fastest], error + _bound_sampling_error(rates, fastest)
+        # The slip rate may have its peak in any interval that is as fast within the noise. The
+        # stress at the peak is between the stresses of the samples at the ends of these intervals.
+        first, stop = _find_successive_rates_above(
+            rates, fastest, float(rates[fastest]) - math.sqrt(2.0) * error
+        )
+        at_peak = float(stress[fastest : fastest + 2].mean())
+        reading = float(np.abs(stress[first : stop + 1] - at_peak).max())
+        reading += HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS * estimate_robust_sd(np.diff(stress))
         row["dynamic_stress_drop"] = (
-            drop.stress_before - ends.mean(),
+            drop.stress_before - at_peak,
             drop.stress_before_error + reading,
         )
     return row
+
+
+def _bound_sampling_error(rates: np.ndarray, fastest: int) -> float:
+    """Return an upper limit of the peak slip rate minus the largest mean slip rate.
+
+    The mean slip rate over a sampling interval is smaller than the peak slip rate. If the slip rate
+    is a parabola near its peak, the difference is at most a third of the largest mean slip rate
+    minus the mean of the two neighbouring slip rates.
+
+    Parameters
+    ----------
+    rates : ndarray, shape (samples - 1,)
+        Mean slip rates between the samples.
+    fastest : int
+        Index of the largest mean slip rate of the event.
+
+    Returns
+    -------
+    float
+        Upper limit, or NaN if the sampling does not resolve the peak.
+    """
+    first, stop = _find_successive_rates_above(rates, fastest, 0.5 * float(rates[fastest]))
+    if stop - first < _MIN_INTERVALS_AT_PEAK_SLIP_RATE:
+        return math.nan
+    beside = rates[[max(fastest - 1, 0), min(fastest + 1, len(rates) - 1)]]
+    return max(float(rates[fastest] - beside.mean()), 0.0)
+
+
+def _find_successive_rates_above(
+    rates: np.ndarray, fastest: int, threshold: float
+) -> tuple[int, int]:
+    """Return the range of indices around the largest slip rate that exceed a threshold."""
+    slow = np.flatnonzero(rates <= threshold)
+    after = int(np.searchsorted(slow, fastest))
+    first = int(slow[after - 1]) + 1 if after else 0
+    return first, int(slow[after]) if after < len(slow) else len(rates)

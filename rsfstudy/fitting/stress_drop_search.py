@@ -1,8 +1,9 @@
 """Detection and fitting of shear stress drops in a record.
 
 The module ``stress_drop_detection`` detects the drops, and the module
-``three_line_stress_drop_fit`` fits straight lines to each drop. The function ``find_stress_drops``
-calls both modules.
+``three_line_stress_drop_fit`` fits straight lines to each drop. The module ``concave_stress_fit``
+measures the highest stress before each drop and the lowest stress after each drop. The function
+``find_stress_drops`` calls these modules.
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rsfstudy.fitting.concave_stress_fit import measure_stress_extrema
 from rsfstudy.fitting.stress_drop_detection import (
     Detection,
     StressDropCandidate,
     detect_stress_drops,
+    estimate_robust_sd,
 )
 from rsfstudy.fitting.three_line_stress_drop_fit import FittedStressDrop, fit_stress_drop
 
@@ -92,10 +95,35 @@ def find_stress_drops(
         if _compute_drop_size(of.fitted_drop)
         > _MIN_DROP_SIZE_OVER_CI_HALF_WIDTH * of.fitted_drop.stress_drop_error
     ]
-    if sure:  # Slow drops increase the noise estimate of long windows.
-        residual = float(np.median([of.fitted_drop.residual_sd for of in sure]))
-        detection = detection._replace(noise_sd=min(detection.noise_sd, residual))
-    return sure, detection
+    if not sure:
+        return sure, detection
+    return _measure_drops(time, stress, sure, detection)
+
+
+def _measure_drops(
+    time: np.ndarray,
+    stress: np.ndarray,
+    drops: list[DetectedAndFittedStressDrop],
+    detection: Detection,
+) -> tuple[list[DetectedAndFittedStressDrop], Detection]:
+    """Measure the highest and the lowest stress of each drop, and the noise between the drops.
+
+    Slow drops and the curvature of stress increase the noise estimate of the detection. The
+    residuals of the concave and convex fits contain only the noise.
+    """
+    residual = float(np.median([of.fitted_drop.residual_sd for of in drops]))
+    noise = min(detection.noise_sd, residual)
+    ends = [-np.inf, *(of.fitted_drop.end_time for of in drops)]
+    begins = [*(of.fitted_drop.start_time for of in drops[1:]), np.inf]
+    measured, residuals = [], []
+    for of, room in zip(drops, zip(ends, begins, strict=False), strict=False):
+        drop, left = measure_stress_extrema(time, stress, *of, room, noise)
+        measured.append(of._replace(fitted_drop=drop))
+        residuals.append(left)
+    pooled = np.concatenate(residuals)
+    if len(pooled):
+        noise = min(noise, estimate_robust_sd(pooled))
+    return measured, detection._replace(noise_sd=noise)
 
 
 def _compute_drop_size(drop: FittedStressDrop) -> float:

@@ -3,8 +3,9 @@
 The function ``fit_stress_drop`` models the stress before, during and after a drop by three
 connected straight lines. The lines meet at the times at which the drop begins and ends. For each
 pair of start time and end time, the lines are fitted by least squares. The fit with the smallest
-sum of squares determines the start and the end of the drop. The size of the drop is the difference
-between the highest and the lowest stress.
+sum of squares determines the start and the end of the drop. The stresses at the start and at the
+end depend on the sampling interval if stress does not decrease suddenly. Therefore, the module
+``concave_stress_fit`` replaces these stresses by the highest and the lowest stress.
 
 The confidence intervals of the start time and the end time are computed from the sums of squares.
 The intervals contain all pairs of times whose sum of squares exceeds the minimum by less than a
@@ -57,7 +58,7 @@ HALF_WIDTH_OF_95_PERCENT_CI_IN_STDERRS = 1.96
 _TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
 #: Smallest number of samples that are required for estimating the stress before a drop, or the
 #: stress after a drop.
-_MIN_SAMPLES_BESIDE_DROP = 3
+MIN_SAMPLES_BESIDE_DROP = 3
 
 
 class FittedStressDrop(NamedTuple):
@@ -68,10 +69,10 @@ class FittedStressDrop(NamedTuple):
     Parameters
     ----------
     start_time, end_time : float
-        Times at which the drop starts and ends. The stress is highest at the start, and lowest at
-        the end.
+        Times at which the drop starts and ends.
     stress_before, stress_after : float
-        Highest stress at the start of the drop, and lowest stress at the end of the drop.
+        Stress at the start and at the end of the drop, or highest stress before the drop and lowest
+        stress after the drop (see ``measure_stress_extrema``).
     start_time_error, end_time_error : float
         Errors of ``start_time`` and ``end_time``.
     stress_before_error, stress_after_error : float
@@ -205,9 +206,9 @@ def fit_stress_drop(
         stress_after_error=float(of_after + spread),
         stress_drop_error=float(of_drop + spread),
         residual_sd=float(np.sqrt(left * every)),
-        starts_before_record=bool(rows[0] == 0 and (t <= t0).sum() < _MIN_SAMPLES_BESIDE_DROP),
+        starts_before_record=bool(rows[0] == 0 and (t <= t0).sum() < MIN_SAMPLES_BESIDE_DROP),
         ends_after_record=bool(
-            rows[-1] == len(time) - 1 and (t >= t1).sum() <= _MIN_SAMPLES_BESIDE_DROP
+            rows[-1] == len(time) - 1 and (t >= t1).sum() <= MIN_SAMPLES_BESIDE_DROP
         ),
     )
 

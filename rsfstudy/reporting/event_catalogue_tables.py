@@ -22,6 +22,10 @@ _HEADING_BY_EVENT_VARIABLE = {
     "slip": "slip",
     "peak_slip_rate": "peak slip rate",
 }
+#: Variables whose errors are printed in the same column.
+_VARIABLES_WITH_ERROR_IN_COLUMN = ("dynamic_stress_drop", "slip", "peak_slip_rate")
+#: Mark of a value that is a lower bound.
+_LOWER_BOUND = ">= "
 #: Maximum number of events that are printed.
 _MAX_LISTED_EVENTS = 50
 
@@ -53,7 +57,7 @@ def build_record_events_tables_and_sentences(event_catalogue: xr.Dataset) -> lis
         for name, words in heads.items():
             units = format_units(event_catalogue[name])
             heading = words if units == "1" else f"{words} ({units})"
-            row[heading] = format_number_or_dash(float(event[name]), ".4g")
+            row[heading] = _format_event_value(event, name)
         rows.append({**row, "cut": flags[int(event["cut"])].replace("_", " ")})
     units = format_units(event_catalogue["noise"])
     stated = "" if units == "1" else f" {units}"
@@ -65,11 +69,25 @@ def build_record_events_tables_and_sentences(event_catalogue: xr.Dataset) -> lis
         f"{float(event_catalogue['smallest_drop']):.3g}{stated}; standard deviation of the noise: "
         f"{float(event_catalogue['noise']):.3g}{stated}"
     )
+    if any(str(value).startswith(_LOWER_BOUND) for row in rows for value in row.values()):
+        pieces.append(
+            f"{_LOWER_BOUND.strip()} marks a lower bound: the sampling interval is too long to "
+            "resolve the peak slip rate"
+        )
     if event_catalogue.attrs["sign_of_shear_stress"] < 0:
         pieces.append("shear stress is negative in the record, so its sign was reversed")
     if processing := event_catalogue.attrs.get("processing"):
         pieces.append(str(processing))
     return pieces
+
+
+def _format_event_value(event: xr.Dataset, name: str) -> str:
+    """Format a quantity of an event, with its error if the error has no separate column."""
+    value = format_number_or_dash(float(event[name]), ".4g")
+    if name not in _VARIABLES_WITH_ERROR_IN_COLUMN or value == "-":
+        return value
+    error = float(event[f"{name}_error"])
+    return f"{_LOWER_BOUND}{value}" if np.isnan(error) else f"{value} +- {error:.2g}"
 
 
 def summarise_events_as_json_fields(event_catalogue: xr.Dataset) -> dict[str, Any]:

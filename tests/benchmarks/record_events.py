@@ -178,6 +178,12 @@ def uneven_sampling(rng: np.random.Generator) -> Catalogue:
     return draw_record(rng, time, lasts=(0.0, 0.3))
 
 
+def coarse_sampling(rng: np.random.Generator) -> Catalogue:
+    """Generate sudden drops at intervals of 40 s, sampled at 1 Hz."""
+    time = np.arange(rng.uniform(0.0, 1.0), 800.0)
+    return draw_record(rng, time, every=40.0, noise=0.003)
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Catalogue]] = {
     "whole": sudden_drops,
     "triggered": triggered_bursts,
@@ -188,6 +194,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Catalogue]] = {
     "small": small_drops,
     "correlated": correlated_noise,
     "uneven": uneven_sampling,
+    "coarse": coarse_sampling,
 }
 
 
