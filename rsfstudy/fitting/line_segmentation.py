@@ -32,9 +32,11 @@ MIN_SEGMENT_ROWS = 5
 #: Smallest reduction of the sum of squares by a split, divided by the noise variance and by ln n
 #: for n rows.
 _MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT = 12.0
-#: Largest number of rows on either side of a boundary that are used to refine the boundary, and
-#: largest number of passes over all boundaries.
-_MAX_REFINEMENT_ROWS, _MAX_REFINEMENT_PASSES = 20_000, 20
+#: Largest increase of the sum of squares by the replacement of two boundaries by a single boundary,
+#: divided by the noise variance and by ln n for n rows.
+_MAX_SQUARES_INCREASE_BY_REPLACEMENT = 4.0
+#: Largest number of passes over all boundaries in a refinement.
+_MAX_REFINEMENT_PASSES = 20
 #: Rounding error of a sum of squared residuals, divided by the sum of squares about the mean and by
 #: the resolution of floating-point numbers.
 _ROUNDING_ERROR_OF_RESIDUAL_SQUARES = 10.0
@@ -202,6 +204,8 @@ class SegmentBoundaryRefinement:
         Weights of the squared residuals.
     variance_of_noise : float
         Variance of the noise of rows with unit weight.
+    max_rows : int
+        Largest number of rows on either side of a boundary from which the boundary is found.
     """
 
     def __init__(
@@ -210,9 +214,11 @@ class SegmentBoundaryRefinement:
         displacement: np.ndarray,
         weights: np.ndarray,
         variance_of_noise: float,
+        max_rows: int,
     ) -> None:
         self.time, self.displacement = time, displacement
         self.weights, self.variance_of_noise = weights, variance_of_noise
+        self.max_rows = max_rows
 
     def refine(self, boundaries: list[int]) -> list[int]:
         """Move the boundaries, and replace pairs of boundaries that span a single change.
@@ -262,6 +268,34 @@ class SegmentBoundaryRefinement:
         level, slope = line.fit_line(0, stop_row - start_row)
         return float(self.displacement[start_row] + level - slope * origin), slope
 
+    def fit_adjacent_lines(
+        self, start_row: int, boundary: int, stop_row: int
+    ) -> tuple[InterceptAndSlope, InterceptAndSlope]:
+        """Fit the two lines next to a boundary, from at most ``max_rows`` rows each.
+
+        Parameters
+        ----------
+        start_row, boundary, stop_row : int
+            First row of the first segment, first row of the second segment, and row after the
+            second segment.
+
+        Returns
+        -------
+        before, after : tuple of (float, float)
+            Intercept and slope of each line.
+        """
+        i, j = self._limit_rows(start_row, boundary, boundary, stop_row)
+        return self.fit_line(i, boundary), self.fit_line(boundary, j)
+
+    def _limit_rows(
+        self, start_row: int, first_boundary: int, last_boundary: int, stop_row: int
+    ) -> tuple[int, int]:
+        """Limit a range of rows to the neighbourhood of its boundaries."""
+        return (
+            max(start_row, first_boundary - self.max_rows),
+            min(stop_row, last_boundary + self.max_rows),
+        )
+
     def _sum(self, start_row: int, stop_row: int) -> CumulativeSumsForLineFits:
         """Return the cumulative sums of a range of rows, relative to its first row.
 
@@ -277,15 +311,20 @@ class SegmentBoundaryRefinement:
 
     def _find_best_boundary(self, start_row: int, boundary: int, stop_row: int) -> int:
         """Return the boundary of the two lines with the smallest sum of squares."""
-        i, j = _limit_rows(start_row, boundary, boundary, stop_row)
+        i, j = self._limit_rows(start_row, boundary, boundary, stop_row)
         at = np.arange(MIN_SEGMENT_ROWS, j - i - MIN_SEGMENT_ROWS + 1)
         return i + int(at[np.argmin(_compute_squares_of_two_lines(self._sum(i, j), at, j - i))])
 
     def _find_single_boundary(
         self, start_row: int, first_boundary: int, second_boundary: int, stop_row: int
     ) -> int | None:
-        """Return a boundary that replaces two boundaries, or None if three lines fit better."""
-        i, j = _limit_rows(start_row, first_boundary, second_boundary, stop_row)
+        """Return a boundary that replaces two boundaries, or None if three lines fit better.
+
+        Boundaries that are more than ``max_rows`` apart are not replaced.
+        """
+        if second_boundary - first_boundary > self.max_rows:
+            return None
+        i, j = self._limit_rows(start_row, first_boundary, second_boundary, stop_row)
         sums, count, first, second = self._sum(i, j), j - i, first_boundary - i, second_boundary - i
         at = np.arange(MIN_SEGMENT_ROWS, count - MIN_SEGMENT_ROWS + 1)
         two_lines = _compute_squares_of_two_lines(sums, at, count)
@@ -298,25 +337,16 @@ class SegmentBoundaryRefinement:
             * np.finfo(float).eps
             * float(sums.compute_squares_about_mean(0, count))
         )
-        allowed = _MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT * math.log(count) * variance + rounding
+        allowed = _MAX_SQUARES_INCREASE_BY_REPLACEMENT * math.log(count) * variance + rounding
         best = int(np.argmin(two_lines))
         return i + int(at[best]) if two_lines[best] - three_lines <= allowed else None
-
-
-def _limit_rows(
-    start_row: int, first_boundary: int, last_boundary: int, stop_row: int
-) -> tuple[int, int]:
-    """Limit a range of rows to the neighbourhood of its boundaries."""
-    return (
-        max(start_row, first_boundary - _MAX_REFINEMENT_ROWS),
-        min(stop_row, last_boundary + _MAX_REFINEMENT_ROWS),
-    )
 
 
 def _compute_squares_of_two_lines(
     sums: CumulativeSumsForLineFits, boundaries: np.ndarray, stop_row: int
 ) -> np.ndarray:
     """Compute the sum of squared residuals of two lines for each boundary."""
-    return sums.compute_line_residual_squares(0, boundaries) + sums.compute_line_residual_squares(
-        boundaries, stop_row
+    return np.asarray(
+        sums.compute_line_residual_squares(0, boundaries)
+        + sums.compute_line_residual_squares(boundaries, stop_row)
     )

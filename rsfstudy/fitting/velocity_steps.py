@@ -25,6 +25,9 @@ from rsfstudy.fitting.line_segmentation import (
 
 #: Largest number of rows that are segmented. Longer records are first averaged over blocks of rows.
 _MAX_ROWS_FOR_STEP_DETECTION = 20_000
+#: Number of blocks on either side of a step from which the time of the step is computed again, with
+#: all rows of these blocks.
+_MAX_REFINEMENT_BLOCKS = 40
 #: Criteria for separate segments of constant velocity. The first value is the smallest change in
 #: velocity between two segments, relative to the faster velocity. The second value is the smallest
 #: displacement due to the change in velocity, relative to the standard deviation of the residuals.
@@ -42,6 +45,8 @@ _MAX_RAMP_SEGMENT_OVER_NEIGHBOURS, _MAX_RAMP_SEGMENT_ROWS = 0.05, 15
 #: Number of rows from which the local noise is estimated. The local noise is used if the ratio of
 #: the local noise to the typical noise exceeds the second value.
 _LOCAL_NOISE_ROWS, _MIN_LOCAL_OVER_GLOBAL_NOISE = 31, 2.0
+#: Smallest standard deviation of the noise, relative to the range of the values.
+_LEAST_NOISE_OVER_RANGE = 1e-9
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
 
@@ -136,18 +141,21 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     knots = sorted(
         split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
     )
-    refinement = SegmentBoundaryRefinement(t - t0, x - x0, weights, variance)
+    refinement = SegmentBoundaryRefinement(t - t0, x - x0, weights, variance, len(t))
     knots = _merge_similar_segments(sums, refinement.refine(knots), t, variance, louder)
     if every > 1:
         variance = noise_variance(time, displacement)
         weights = np.pad(np.repeat(weights, every), (0, len(time) - count), mode="edge")
-        refinement = SegmentBoundaryRefinement(time - t0, displacement - x0, weights, variance)
-        knots = [*(every * k for k in knots[:-1]), len(time)]
-    knots = refinement.refine(knots)
+        refinement = SegmentBoundaryRefinement(
+            time - t0, displacement - x0, weights, variance, _MAX_REFINEMENT_BLOCKS * every
+        )
+        knots = refinement.refine([*(every * k for k in knots[:-1]), len(time)])
     lines = [refinement.fit_line(i, j) for i, j in itertools.pairwise(knots)]
     meets = [
         _compute_line_intersection_time(
-            lines[n], lines[n + 1], (time[k - 1] - t0, time[k] - t0), variance
+            *refinement.fit_adjacent_lines(*knots[n : n + 3]),
+            (time[k - 1] - t0, time[k] - t0),
+            variance,
         )
         for n, k in enumerate(knots[1:-1])
     ]
@@ -198,7 +206,7 @@ def _compute_local_over_typical_noise(time: np.ndarray, displacement: np.ndarray
     """
     off = np.abs(_compute_deviations_from_neighbours(time, displacement))
     typical = float(np.median(off))
-    if len(off) < 4 * _LOCAL_NOISE_ROWS or not typical > 0.0:
+    if len(off) < 4 * _LOCAL_NOISE_ROWS or typical <= _compute_least_noise(displacement):
         return np.ones(len(time))
     local = maximum_filter1d(
         median_filter(off, _LOCAL_NOISE_ROWS, mode="nearest"), _LOCAL_NOISE_ROWS
@@ -245,8 +253,15 @@ def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
     spread = _STANDARD_DEVIATION_PER_MAD * float(
         np.median(np.abs(_compute_deviations_from_neighbours(t, x)))
     )
-    least = 1e-9 * float(np.ptp(x))  # A synthetic record may have no noise.
-    return max(spread, least) ** 2
+    return max(spread, _compute_least_noise(x)) ** 2
+
+
+def _compute_least_noise(values: np.ndarray) -> float:
+    """Return the smallest standard deviation that is considered to be noise.
+
+    A synthetic record may have no noise except for the rounding errors of floating-point numbers.
+    """
+    return _LEAST_NOISE_OVER_RANGE * float(np.ptp(values))
 
 
 def _merge_similar_segments(
