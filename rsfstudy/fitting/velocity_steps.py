@@ -287,7 +287,7 @@ def _merge_similar_segments(
         )
         change, lasts = np.abs(np.diff(speeds)), np.diff(time[[*segment_boundaries[:-1], -1]])
         faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
-        differs = change / (
+        differs = _compute_change_across_ramps(speeds, np.diff(segment_boundaries)) / (
             _MIN_RELATIVE_VELOCITY_CHANGE
             * np.maximum(faster, _MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY * np.abs(speeds).max())
         )
@@ -300,6 +300,21 @@ def _merge_similar_segments(
             break
         del segment_boundaries[least + 1]
     return segment_boundaries
+
+
+def _compute_change_across_ramps(velocities: np.ndarray, row_counts: np.ndarray) -> np.ndarray:
+    """Return the change in velocity at each boundary between segments.
+
+    A segment with few rows and an intermediate velocity is part of a ramp. At both of its
+    boundaries, the change in velocity is the change across the ramp.
+    """
+    changes = np.diff(velocities)
+    across = np.abs(changes)
+    ramps = (row_counts[1:-1] < _MAX_RAMP_SEGMENT_ROWS) & (changes[1:] * changes[:-1] > 0.0)
+    total = np.where(ramps, np.abs(changes[1:] + changes[:-1]), 0.0)
+    across[:-1] = np.maximum(across[:-1], total)
+    across[1:] = np.maximum(across[1:], total)
+    return across
 
 
 def _compute_line_intersection_time(
