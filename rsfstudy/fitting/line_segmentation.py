@@ -35,6 +35,8 @@ _MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT = 12.0
 #: Largest increase of the sum of squares by the replacement of two boundaries by a single boundary,
 #: divided by the noise variance and by ln n for n rows.
 _MAX_SQUARES_INCREASE_BY_REPLACEMENT = 4.0
+#: Largest mean square of the residuals with which a boundary moves, relative to the noise variance.
+_MAX_RESIDUAL_VARIANCE_RATIO = 4.0
 #: Largest number of passes over all boundaries in a refinement.
 _MAX_REFINEMENT_PASSES = 20
 #: Rounding error of a sum of squared residuals, divided by the sum of squares about the mean and by
@@ -310,10 +312,20 @@ class SegmentBoundaryRefinement:
         )
 
     def _find_best_boundary(self, start_row: int, boundary: int, stop_row: int) -> int:
-        """Return the boundary of the two lines with the smallest sum of squares."""
+        """Return the boundary of the two lines with the smallest sum of squares.
+
+        The boundary does not move if the residuals of the two lines are much larger than the noise.
+        The sum of squares then depends on slow deviations from the lines, such as periodic errors
+        of a screw, and its minimum may be far from the change in slope.
+        """
         i, j = self._limit_rows(start_row, boundary, boundary, stop_row)
-        at = np.arange(MIN_SEGMENT_ROWS, j - i - MIN_SEGMENT_ROWS + 1)
-        return i + int(at[np.argmin(_compute_squares_of_two_lines(self._sum(i, j), at, j - i))])
+        at, sums = np.arange(MIN_SEGMENT_ROWS, j - i - MIN_SEGMENT_ROWS + 1), self._sum(i, j)
+        squares = _compute_squares_of_two_lines(sums, at, j - i)
+        best = int(np.argmin(squares))
+        largest = _MAX_RESIDUAL_VARIANCE_RATIO * self.variance_of_noise * (j - i)
+        if squares[best] > largest + _compute_rounding_error(sums, j - i):
+            return boundary
+        return i + int(at[best])
 
     def _find_single_boundary(
         self, start_row: int, first_boundary: int, second_boundary: int, stop_row: int
@@ -332,11 +344,7 @@ class SegmentBoundaryRefinement:
             np.array([0, first, second]), np.array([first, second, count])
         ).sum()
         variance = max(self.variance_of_noise, float(three_lines) / count)
-        rounding = (
-            _ROUNDING_ERROR_OF_RESIDUAL_SQUARES
-            * np.finfo(float).eps
-            * float(sums.compute_squares_about_mean(0, count))
-        )
+        rounding = _compute_rounding_error(sums, count)
         allowed = _MAX_SQUARES_INCREASE_BY_REPLACEMENT * math.log(count) * variance + rounding
         best = int(np.argmin(two_lines))
         return i + int(at[best]) if two_lines[best] - three_lines <= allowed else None
@@ -350,3 +358,9 @@ def _compute_squares_of_two_lines(
         sums.compute_line_residual_squares(0, boundaries)
         + sums.compute_line_residual_squares(boundaries, stop_row)
     )
+
+
+def _compute_rounding_error(sums: CumulativeSumsForLineFits, stop_row: int) -> float:
+    """Return the rounding error of the sum of squared residuals of all rows."""
+    squares = float(sums.compute_squares_about_mean(0, stop_row))
+    return float(_ROUNDING_ERROR_OF_RESIDUAL_SQUARES * np.finfo(float).eps * squares)

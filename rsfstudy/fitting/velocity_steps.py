@@ -142,7 +142,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
         split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
     )
     refinement = SegmentBoundaryRefinement(t - t0, x - x0, weights, variance, len(t))
-    knots = _merge_similar_segments(sums, refinement.refine(knots), t, variance, louder)
+    knots = refinement.refine(_merge_similar_segments(sums, knots, t, variance, louder))
     if every > 1:
         variance = noise_variance(time, displacement)
         weights = np.pad(np.repeat(weights, every), (0, len(time) - count), mode="edge")
