@@ -181,7 +181,21 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
             late = min(max((x - y) / (w - v), begins), ends) - 0.5 * (begins + ends)
             begins, ends = begins + late, ends + late
         found.append(LoadingStep(t0 + begins, t0 + ends, speeds[first], speeds[last + 1]))
-    return tuple(found)
+    return tuple(_move_to_nearest_rows(step, time) for step in found)
+
+
+def _move_to_nearest_rows(step: LoadingStep, time: np.ndarray) -> LoadingStep:
+    """Move the ends of a step to a row if they differ from its time by rounding errors only.
+
+    Without the rounding errors, a row at the time of a step belongs to the same window of the
+    record, whatever the order of the arithmetic operations is.
+    """
+
+    def move(at: float) -> float:
+        row = float(time[np.argmin(np.abs(time - at))])
+        return row if abs(row - at) <= _LEAST_NOISE_OVER_RANGE * float(np.ptp(time)) else at
+
+    return step._replace(start=move(step.start), end=move(step.end))
 
 
 def _compute_deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
