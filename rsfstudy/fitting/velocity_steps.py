@@ -129,36 +129,10 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     tuple of LoadingStep
         Steps in order of time.
     """
-    every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
-    count = len(time) // every * every
-    t, x = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, displacement))
-    if len(t) < 2 * MIN_SEGMENT_ROWS:
+    t0, x0 = time[0], displacement[0]
+    lines, meets, row_counts = _find_segments(time - t0, displacement - x0)
+    if not lines:
         return ()
-    t0, x0 = t[0], x[0]
-    variance, louder = noise_variance(t, x), _compute_local_over_typical_noise(t, x)
-    weights = 1.0 / louder**2
-    sums = CumulativeSumsForLineFits(t - t0, x - x0, weights)
-    knots = sorted(
-        split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
-    )
-    refinement = SegmentBoundaryRefinement(t - t0, x - x0, weights, variance, len(t))
-    knots = refinement.refine(_merge_similar_segments(sums, knots, t, variance, louder))
-    if every > 1:
-        variance = noise_variance(time, displacement)
-        weights = np.pad(np.repeat(weights, every), (0, len(time) - count), mode="edge")
-        refinement = SegmentBoundaryRefinement(
-            time - t0, displacement - x0, weights, variance, _MAX_REFINEMENT_BLOCKS * every
-        )
-        knots = refinement.refine([*(every * k for k in knots[:-1]), len(time)])
-    lines = [refinement.fit_line(i, j) for i, j in itertools.pairwise(knots)]
-    meets = [
-        _compute_line_intersection_time(
-            *refinement.fit_adjacent_lines(*knots[n : n + 3]),
-            (time[k - 1] - t0, time[k] - t0),
-            variance,
-        )
-        for n, k in enumerate(knots[1:-1])
-    ]
     fastest = max(abs(line[1]) for line in lines)
     speeds = [
         line[1] if abs(line[1]) > _MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY * fastest else 0.0
@@ -166,7 +140,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     ]
     found = []
     for first, last in _group_velocity_changes_into_steps(
-        meets, speeds, (np.diff(knots) / every).tolist(), (0.0, t[-1] - t0)
+        meets, speeds, row_counts, (0.0, time[-1] - t0)
     ):
         begins, ends = meets[first], meets[last]
         if _has_velocity_overshoot(speeds[first : last + 2]):
@@ -276,6 +250,51 @@ def _compute_least_noise(values: np.ndarray) -> float:
     A synthetic record may have no noise except for the rounding errors of floating-point numbers.
     """
     return _LEAST_NOISE_OVER_RANGE * float(np.ptp(values))
+
+
+def _find_segments(
+    time: np.ndarray, displacement: np.ndarray
+) -> tuple[list[InterceptAndSlope], list[float], list[float]]:
+    """Find the segments of constant velocity in a record.
+
+    Returns
+    -------
+    lines : list of (float, float)
+        Displacement at time 0 and velocity of each segment.
+    intersections : list of float
+        Times in s at which the lines of neighbouring segments intersect.
+    row_counts : list of float
+        Number of rows of each segment, or number of blocks of rows in a long record.
+    """
+    every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
+    count = len(time) // every * every
+    t, x = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, displacement))
+    if len(t) < 2 * MIN_SEGMENT_ROWS:
+        return [], [], []
+    variance, louder = noise_variance(t, x), _compute_local_over_typical_noise(t, x)
+    weights = 1.0 / louder**2
+    sums = CumulativeSumsForLineFits(t, x, weights)
+    knots = sorted(
+        split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
+    )
+    knots = _merge_similar_segments(sums, knots, t, variance, louder)
+    refinement = SegmentBoundaryRefinement(t, x, weights, variance, len(t))
+    knots = refinement.refine(knots)
+    if every > 1:
+        variance = noise_variance(time, displacement)
+        weights = np.pad(np.repeat(weights, every), (0, len(time) - count), mode="edge")
+        refinement = SegmentBoundaryRefinement(
+            time, displacement, weights, variance, _MAX_REFINEMENT_BLOCKS * every
+        )
+        knots = refinement.refine([*(every * k for k in knots[:-1]), len(time)])
+    lines = [refinement.fit_line(i, j) for i, j in itertools.pairwise(knots)]
+    intersections = [
+        _compute_line_intersection_time(
+            *refinement.fit_adjacent_lines(*knots[n : n + 3]), (time[k - 1], time[k]), variance
+        )
+        for n, k in enumerate(knots[1:-1])
+    ]
+    return lines, intersections, (np.diff(knots) / every).tolist()
 
 
 def _merge_similar_segments(
