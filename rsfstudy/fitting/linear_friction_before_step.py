@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from rsfstudy.fitting.line_segmentation import CumulativeSumsForLineFits
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
-from rsfstudy.fitting.velocity_steps import CumulativeSumsForLineFits
 
 #: Limits for the amount of data. The first two values are the largest number of block averages of
 #: friction, and the smallest number of block averages in each of two lines. The third value is the

@@ -37,13 +37,14 @@ import xarray as xr
 from scipy.optimize import least_squares
 
 from rsfstudy.fitting.friction_trend import fit_friction_trend
+from rsfstudy.fitting.line_segmentation import CumulativeSumsForLineFits
 from rsfstudy.fitting.local_regression import compute_weighted_mean
 from rsfstudy.fitting.noise_models import (
     AUTOREGRESSIVE_NOISE_NAME,
     build_white_noise_model,
     fit_noise_model,
 )
-from rsfstudy.fitting.velocity_steps import CumulativeSumsForLineFits, LoadingStep, noise_variance
+from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 
 #: Kinds of locked portions of a record.

@@ -1,41 +1,39 @@
-r"""Detection of load point velocity steps in a record.
+"""Detection of load point velocity steps in a record.
 
 The displacement of the load point is approximated by straight segments, and a step is the boundary
-between two segments. Binary segmentation [1]_ [2]_ finds the segments. Let :math:`S(i, j)` be the
-sum of squared residuals of the line through the rows i to j. The algorithm splits the rows at the
-row k that minimises :math:`S(i, k) + S(k, j)`. A split is accepted if it reduces the sum of squares
-by more than :math:`12 \ln(j - i)` times the noise variance, which is far more than expected by
-chance.
-
-References
-----------
-.. [1] Scott and Knott (1974), Biometrics 30, 507-512.
-.. [2] Bai and Perron (1998), Econometrica 66, 47-78.
+between two segments. The module ``line_segmentation`` finds the segments.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from rsfstudy.exception_conversion import make_methods_raise_rsfstudy_errors
+from rsfstudy.fitting.line_segmentation import (
+    MIN_SEGMENT_ROWS,
+    CumulativeSumsForLineFits,
+    InterceptAndSlope,
+    SegmentBoundaryRefinement,
+    split_rows_into_segments,
+)
 
 #: Largest number of rows that are segmented. Longer records are first averaged over blocks of rows.
 _MAX_ROWS_FOR_STEP_DETECTION = 20_000
-#: Criteria for separate segments of constant velocity. The first value is the smallest number of
-#: rows of a segment. The second value is the smallest change in velocity between two segments,
-#: relative to the faster velocity. The third value is the smallest displacement due to the change
-#: in velocity, relative to the standard deviation of the residuals. The third criterion is
-#: necessary because a servo-controlled load point fluctuates around its set point.
-_MIN_SEGMENT_ROWS, _MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_CHANGE_SIGMAS = 5, 0.2, 10.0
-#: Smallest reduction of the sum of squares by a split, divided by the noise variance and by ln n
-#: for n rows.
-_MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT = 12.0
+#: Number of blocks on either side of a step from which the time of the step is computed again, with
+#: all rows of these blocks.
+_MAX_REFINEMENT_BLOCKS = 40
+#: Criteria for separate segments of constant velocity. The first value is the smallest change in
+#: velocity between two segments, relative to the faster velocity. The second value is the smallest
+#: displacement due to the change in velocity, relative to the standard deviation of the residuals.
+#: The second criterion is necessary because a servo-controlled load point fluctuates around its set
+#: point.
+_MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_CHANGE_SIGMAS = 0.2, 10.0
 #: The load point is considered to be held if its velocity is less than this fraction of its highest
 #: velocity.
 _MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY = 0.01
@@ -47,14 +45,10 @@ _MAX_RAMP_SEGMENT_OVER_NEIGHBOURS, _MAX_RAMP_SEGMENT_ROWS = 0.05, 15
 #: Number of rows from which the local noise is estimated. The local noise is used if the ratio of
 #: the local noise to the typical noise exceeds the second value.
 _LOCAL_NOISE_ROWS, _MIN_LOCAL_OVER_GLOBAL_NOISE = 31, 2.0
+#: Smallest standard deviation of the noise, relative to the range of the values.
+_LEAST_NOISE_OVER_RANGE = 1e-9
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
-
-
-#: Function that returns the sum of squared residuals of the rows i to j.
-ResidualSquaresFunction = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
-#: Straight line of displacement against time, as the displacement at time 0 and the velocity.
-_InterceptAndSlope = tuple[float, float]
 
 
 @make_methods_raise_rsfstudy_errors
@@ -135,31 +129,10 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     tuple of LoadingStep
         Steps in order of time.
     """
-    every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
-    count = len(time) // every * every
-    t, x = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, displacement))
-    if len(t) < 2 * _MIN_SEGMENT_ROWS:
+    t0, x0 = time[0], displacement[0]
+    lines, meets, row_counts = _find_segments(time - t0, displacement - x0)
+    if not lines:
         return ()
-    t0, x0 = t[0], x[0]
-    variance, louder = noise_variance(t, x), _compute_local_over_typical_noise(t, x)
-    sums = CumulativeSumsForLineFits(t - t0, x - x0, 1.0 / louder**2)
-    knots = sorted(
-        split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
-    )
-    knots = _merge_similar_segments(sums, knots, t, variance, louder)
-    lines = [sums.fit_line(i, j) for i, j in itertools.pairwise(knots)]
-    meets = [
-        _compute_line_intersection_time(
-            lines[n], lines[n + 1], (t[k - 1] - t0, t[k] - t0), variance
-        )
-        for n, k in enumerate(knots[1:-1])
-    ]
-    if every > 1:
-        moved, variance = displacement - x0, noise_variance(time, displacement)
-        meets = [
-            _refine_line_intersection_time(time - t0, moved, at, 2 * every, variance)
-            for at in meets
-        ]
     fastest = max(abs(line[1]) for line in lines)
     speeds = [
         line[1] if abs(line[1]) > _MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY * fastest else 0.0
@@ -167,7 +140,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     ]
     found = []
     for first, last in _group_velocity_changes_into_steps(
-        meets, speeds, np.diff(knots).tolist(), (0.0, t[-1] - t0)
+        meets, speeds, row_counts, (0.0, time[-1] - t0)
     ):
         begins, ends = meets[first], meets[last]
         if _has_velocity_overshoot(speeds[first : last + 2]):
@@ -182,111 +155,21 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
             late = min(max((x - y) / (w - v), begins), ends) - 0.5 * (begins + ends)
             begins, ends = begins + late, ends + late
         found.append(LoadingStep(t0 + begins, t0 + ends, speeds[first], speeds[last + 1]))
-    return tuple(found)
+    return tuple(_move_to_nearest_rows(step, time) for step in found)
 
 
-class CumulativeSumsForLineFits:
-    """Cumulative sums for fitting lines to any range of rows.
+def _move_to_nearest_rows(step: LoadingStep, time: np.ndarray) -> LoadingStep:
+    """Move the ends of a step to a row if they differ from its time by rounding errors only.
 
-    The computing time of a fit does not depend on the number of rows in the range. In all methods,
-    a range includes ``start_row`` and excludes ``stop_row``. If ``start_row`` or ``stop_row`` is an
-    array, the methods return one result for each range.
-
-    Parameters
-    ----------
-    time, displacement : ndarray, shape (rows,)
-        Independent and dependent variable.
-    weights : ndarray, shape (rows,)
-        Weights of the squared residuals.
+    Without the rounding errors, a row at the time of a step belongs to the same window of the
+    record, whatever the order of the arithmetic operations is.
     """
 
-    def __init__(self, time: np.ndarray, displacement: np.ndarray, weights: np.ndarray) -> None:
-        columns = weights * np.array(
-            [
-                np.ones(len(time)),
-                time,
-                displacement,
-                time * time,
-                time * displacement,
-                displacement * displacement,
-            ]
-        )
-        self.cumulative_sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
+    def move(at: float) -> float:
+        row = float(time[np.argmin(np.abs(time - at))])
+        return row if abs(row - at) <= _LEAST_NOISE_OVER_RANGE * float(np.ptp(time)) else at
 
-    def compute_weighted_moments(
-        self, start_row: np.ndarray | int, stop_row: np.ndarray | int
-    ) -> tuple[np.ndarray, ...]:
-        """Compute the weighted moments of a range of rows.
-
-        Parameters
-        ----------
-        start_row, stop_row : int or ndarray of int
-            First row of the range, and row after the last row of the range.
-
-        Returns
-        -------
-        tuple of ndarray
-            The mean of t, the mean of x, and the weighted sums of dt dt, dt dx and dx dx over the
-            rows. Here, dt and dx are the deviations of t and x from their means.
-        """
-        n, st, sx, stt, stx, sxx = (
-            self.cumulative_sums[stop_row] - self.cumulative_sums[start_row]
-        ).T
-        mt, mx = st / n, sx / n
-        return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
-
-    def compute_line_residual_squares(
-        self, start_row: np.ndarray | int, stop_row: np.ndarray | int
-    ) -> np.ndarray:
-        """Compute the sum of squared residuals of a line fit.
-
-        Parameters
-        ----------
-        start_row, stop_row : int or ndarray of int
-            First row of the range, and row after the last row of the range.
-
-        Returns
-        -------
-        ndarray
-            Weighted sum of squared residuals of each range.
-        """
-        _mt, _mx, tt, tx, xx = self.compute_weighted_moments(start_row, stop_row)
-        return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
-
-    def compute_squares_about_mean(
-        self, start_row: np.ndarray | int, stop_row: np.ndarray | int
-    ) -> np.ndarray:
-        """Compute the sum of squared deviations from the mean.
-
-        Parameters
-        ----------
-        start_row, stop_row : int or ndarray of int
-            First row of the range, and row after the last row of the range.
-
-        Returns
-        -------
-        ndarray
-            Weighted sum of squared deviations of each range.
-        """
-        return np.asarray(np.maximum(self.compute_weighted_moments(start_row, stop_row)[4], 0.0))
-
-    def fit_line(self, start_row: int, stop_row: int) -> _InterceptAndSlope:
-        """Fit a line to a range of rows.
-
-        Parameters
-        ----------
-        start_row, stop_row : int
-            First row of the range, and row after the last row of the range.
-
-        Returns
-        -------
-        intercept : float
-            Value of x at t = 0.
-        slope : float
-            Slope of the line.
-        """
-        mt, mx, tt, tx, _xx = self.compute_weighted_moments(start_row, stop_row)
-        return float(mx - tx / tt * mt), float(tx / tt)
+    return step._replace(start=move(step.start), end=move(step.end))
 
 
 def _compute_deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
@@ -311,7 +194,7 @@ def _compute_local_over_typical_noise(time: np.ndarray, displacement: np.ndarray
     """
     off = np.abs(_compute_deviations_from_neighbours(time, displacement))
     typical = float(np.median(off))
-    if len(off) < 4 * _LOCAL_NOISE_ROWS or not typical > 0.0:
+    if len(off) < 4 * _LOCAL_NOISE_ROWS or typical <= _compute_least_noise(displacement):
         return np.ones(len(time))
     local = maximum_filter1d(
         median_filter(off, _LOCAL_NOISE_ROWS, mode="nearest"), _LOCAL_NOISE_ROWS
@@ -358,50 +241,60 @@ def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
     spread = _STANDARD_DEVIATION_PER_MAD * float(
         np.median(np.abs(_compute_deviations_from_neighbours(t, x)))
     )
-    least = 1e-9 * float(np.ptp(x))  # A synthetic record may have no noise.
-    return max(spread, least) ** 2
+    return max(spread, _compute_least_noise(x)) ** 2
 
 
-def split_rows_into_segments(
-    residual_squares_function: ResidualSquaresFunction,
-    first_row: int,
-    stop_row: int,
-    variance_of_noise: float,
-) -> set[int]:
-    """Split rows into segments by binary segmentation.
+def _compute_least_noise(values: np.ndarray) -> float:
+    """Return the smallest standard deviation that is considered to be noise.
 
-    The function splits a segment if the split reduces the sum of squared residuals by far more than
-    expected by chance.
+    A synthetic record may have no noise except for the rounding errors of floating-point numbers.
+    """
+    return _LEAST_NOISE_OVER_RANGE * float(np.ptp(values))
 
-    Parameters
-    ----------
-    residual_squares_function : callable
-        Function that returns the sum of squared residuals of the rows i to j.
-    first_row, stop_row : int
-        First row of the range to split, and row after the last row of the range.
-    variance_of_noise : float
-        Variance of the noise.
+
+def _find_segments(
+    time: np.ndarray, displacement: np.ndarray
+) -> tuple[list[InterceptAndSlope], list[float], list[float]]:
+    """Find the segments of constant velocity in a record.
 
     Returns
     -------
-    set of int
-        First row of each segment, and the row ``stop_row`` after the last segment.
+    lines : list of (float, float)
+        Displacement at time 0 and velocity of each segment.
+    intersections : list of float
+        Times in s at which the lines of neighbouring segments intersect.
+    row_counts : list of float
+        Number of rows of each segment, or number of blocks of rows in a long record.
     """
-    open_parts, found = [(first_row, stop_row)], {first_row, stop_row}
-    while open_parts:
-        i, j = open_parts.pop()
-        at = np.arange(i + _MIN_SEGMENT_ROWS, j - _MIN_SEGMENT_ROWS + 1)
-        if not len(at):
-            continue
-        both = residual_squares_function(i, at) + residual_squares_function(at, j)
-        best = int(at[np.argmin(both)])
-        if (
-            residual_squares_function(i, j) - both.min()
-            > _MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT * math.log(j - i) * variance_of_noise
-        ):
-            found.add(best)
-            open_parts += [(i, best), (best, j)]
-    return found
+    every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
+    count = len(time) // every * every
+    t, x = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, displacement))
+    if len(t) < 2 * MIN_SEGMENT_ROWS:
+        return [], [], []
+    variance, louder = noise_variance(t, x), _compute_local_over_typical_noise(t, x)
+    weights = 1.0 / louder**2
+    sums = CumulativeSumsForLineFits(t, x, weights)
+    knots = sorted(
+        split_rows_into_segments(sums.compute_line_residual_squares, 0, len(t), variance)
+    )
+    knots = _merge_similar_segments(sums, knots, t, variance, louder)
+    refinement = SegmentBoundaryRefinement(t, x, weights, variance, len(t))
+    knots = refinement.refine(knots)
+    if every > 1:
+        variance = noise_variance(time, displacement)
+        weights = np.pad(np.repeat(weights, every), (0, len(time) - count), mode="edge")
+        refinement = SegmentBoundaryRefinement(
+            time, displacement, weights, variance, _MAX_REFINEMENT_BLOCKS * every
+        )
+        knots = refinement.refine([*(every * k for k in knots[:-1]), len(time)])
+    lines = [refinement.fit_line(i, j) for i, j in itertools.pairwise(knots)]
+    intersections = [
+        _compute_line_intersection_time(
+            *refinement.fit_adjacent_lines(*knots[n : n + 3]), (time[k - 1], time[k]), variance
+        )
+        for n, k in enumerate(knots[1:-1])
+    ]
+    return lines, intersections, (np.diff(knots) / every).tolist()
 
 
 def _merge_similar_segments(
@@ -427,7 +320,7 @@ def _merge_similar_segments(
         )
         change, lasts = np.abs(np.diff(speeds)), np.diff(time[[*segment_boundaries[:-1], -1]])
         faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
-        differs = change / (
+        differs = _compute_change_across_ramps(speeds, np.diff(segment_boundaries)) / (
             _MIN_RELATIVE_VELOCITY_CHANGE
             * np.maximum(faster, _MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY * np.abs(speeds).max())
         )
@@ -442,9 +335,24 @@ def _merge_similar_segments(
     return segment_boundaries
 
 
+def _compute_change_across_ramps(velocities: np.ndarray, row_counts: np.ndarray) -> np.ndarray:
+    """Return the change in velocity at each boundary between segments.
+
+    A segment with few rows and an intermediate velocity is part of a ramp. At both of its
+    boundaries, the change in velocity is the change across the ramp.
+    """
+    changes = np.diff(velocities)
+    across = np.abs(changes)
+    ramps = (row_counts[1:-1] < _MAX_RAMP_SEGMENT_ROWS) & (changes[1:] * changes[:-1] > 0.0)
+    total = np.where(ramps, np.abs(changes[1:] + changes[:-1]), 0.0)
+    across[:-1] = np.maximum(across[:-1], total)
+    across[1:] = np.maximum(across[1:], total)
+    return across
+
+
 def _compute_line_intersection_time(
-    first_line: _InterceptAndSlope,
-    second_line: _InterceptAndSlope,
+    first_line: InterceptAndSlope,
+    second_line: InterceptAndSlope,
     boundary_times: tuple[float, float],
     variance_of_noise: float,
 ) -> float:
@@ -462,40 +370,10 @@ def _compute_line_intersection_time(
     return float(min(max(meet, middle - reach), middle + reach))
 
 
-def _refine_line_intersection_time(
-    time: np.ndarray,
-    displacement: np.ndarray,
-    initial_time: float,
-    initial_uncertainty_in_rows: int,
-    variance_of_noise: float,
-) -> float:
-    """Compute the intersection of two lines again, from all rows of the record.
-
-    The first estimate of the intersection is less accurate if the rows were averaged in blocks for
-    the segmentation.
-    """
-    middle = int(np.searchsorted(time, initial_time))
-    i, j = (
-        max(middle - 20 * initial_uncertainty_in_rows, 0),
-        min(middle + 20 * initial_uncertainty_in_rows, len(time)),
-    )
-    t, x = time[i:j] - initial_time, displacement[i:j]
-    sums = CumulativeSumsForLineFits(t, x - x[0], np.ones(j - i))
-    places = np.arange(_MIN_SEGMENT_ROWS, j - i - _MIN_SEGMENT_ROWS)
-    both = sums.compute_line_residual_squares(0, places) + sums.compute_line_residual_squares(
-        places, j - i
-    )
-    best = int(places[np.argmin(both)])
-    lines = sums.fit_line(0, best), sums.fit_line(best, j - i)
-    return initial_time + _compute_line_intersection_time(
-        *lines, (t[best - 1], t[best]), variance_of_noise
-    )
-
-
 def _group_velocity_changes_into_steps(
     times: list[float],
     velocities: list[float],
-    segment_row_counts: list[int],
+    segment_row_counts: list[float],
     end_times: tuple[float, float],
 ) -> Iterator[tuple[int, int]]:
     """Group successive velocity changes into steps.
