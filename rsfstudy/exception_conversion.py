@@ -164,8 +164,8 @@ def _wrap_to_raise_rsfstudy_errors(
     If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
     stored in files, and the arguments are also checked against their annotations. The arguments are
     checked after the call, because the errors that the function itself raises are more specific. If
-    the function has the attribute ``convert_arguments``, this callable is used to convert
-    deprecated arguments.
+    the function has the attribute ``convert_arguments``, this callable converts deprecated
+    arguments.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")
@@ -305,9 +305,10 @@ def format_exception(error: BaseException) -> str:
 
 
 def check_regular_file(argument_name: str, path: str | Path) -> None:
-    """Reject a path of a directory, a pipe or a device.
+    """Reject the path of a directory, a pipe or a device.
 
-    Reading from a pipe or a device might never return. A path that does not exist is accepted.
+    Reading from a pipe or a device might never return. The function accepts a path that does not
+    exist.
 
     Parameters
     ----------

@@ -467,7 +467,7 @@ def _format_html_table_cell(value: Any) -> str:
 
 
 def replace_comment_on_scales(attributes: Mapping[Any, Any], replacement: str) -> dict[Any, Any]:
-    """Replace the comment on the attribute ``scale`` after this attribute was removed.
+    """Replace the comment that describes the removed attribute ``scale``.
 
     Parameters
     ----------

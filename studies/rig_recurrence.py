@@ -2,11 +2,11 @@
 
 The figures show the recurrence interval in s and the static stress drop in MPa against load point
 velocity in um/s at three normal stresses. The stiffness of the machine is 0.4, 0.2 and 0.1 of the
-critical stiffness at 5, 10 and 20 MPa. Stress drops decrease with the logarithm of load point
-velocity by slightly more than 2 (b-a) sigma. One half of this decrease is due to friction, and the
-other half is due to overshoot. Lines show the time in which the load point restores the stress drop
-if the slider is at rest. The recurrence interval is slightly longer, because the slider creeps
-during this time.
+critical stiffness at 5, 10 and 20 MPa. Stress drops decrease by slightly more than 2 (b-a) sigma
+per unit increase in the natural logarithm of the load point velocity. One half of this decrease is
+due to friction, and the other half is due to overshoot. Lines show the time in which the load point
+restores the stress drop if the slider is at rest. The recurrence interval is slightly longer,
+because the slider creeps during this time.
 """
 
 from dataclasses import replace

@@ -103,8 +103,8 @@ def critical_step(
     this dependence.
 
     Under the slowness law at constant normal stress and :math:`k \ge k_{cr}`, every quasi-static
-    motion stays bounded [1]_. The computed step is the smallest step after which the slip rate
-    reaches the norm. It grows without limit with the norm.
+    motion stays bounded [1]_. The result is then the smallest step after which the slip rate
+    reaches the instability norm. It grows without limit with the norm.
 
     References
     ----------

@@ -164,7 +164,7 @@ class InterpolatorBetweenMotionRows:
         return merged
 
     def measure_event(self, first_row: int, last_row: int) -> EventNumbers:
-        """Measure the quantities of an event with their interpolation errors.
+        """Measure the quantities of an event and their interpolation errors.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Consoles that print plain text to the standard output and the standard error."""
+"""Consoles that print plain text to standard output and standard error."""
 
 from __future__ import annotations
 

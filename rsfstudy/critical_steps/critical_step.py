@@ -132,8 +132,8 @@ class CriticalStep(Measure):
     and 14 of [2]_.
 
     Under the slowness law at constant normal stress and :math:`k \ge k_{cr}`, every quasi-static
-    motion stays bounded [3]_. The computed step is the smallest step after which the slip rate
-    reaches the norm. It grows without limit with the norm.
+    motion stays bounded [3]_. The result is then the smallest step after which the slip rate
+    reaches the instability norm. It grows without limit with the norm.
 
     References
     ----------

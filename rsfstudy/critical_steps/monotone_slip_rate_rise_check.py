@@ -1,4 +1,4 @@
-"""Monotonic rise of slip rate to a fast load point velocity.
+"""Monotonic rise of the slip rate to a fast load point velocity.
 
 If seismic waves radiate most of the stress, the slip rate V rises gradually. The slip during this
 rise is eta V_0/(K D_c), which is many times D_c. During the rise of the slip rate, the state stays

@@ -128,7 +128,7 @@ def _tolerate_lost_resource_tracker() -> None:
 
 
 def _close_client(dask_client: Any) -> None:
-    """Close the client of a local cluster, also if its event loop has already ended.
+    """Close the client of a local cluster, even if its event loop has already ended.
 
     Without an event loop, Dask cannot close the client, and the error would hide the results of the
     run. Both the client and its cluster are then marked as closed.

@@ -2,16 +2,16 @@
 
 The shear stress of a spring-slider increases during loading, and slip before the event reduces the
 loading rate until stress reaches a maximum and decreases. Therefore, stress is a concave function
-of time until the middle of the drop. In the same way, stress is a convex function of time after the
+of time until the middle of the drop. Similarly, stress is a convex function of time after the
 middle of the drop. The function ``measure_stress_extrema`` fits a concave function and a convex
 function to the samples by least squares [1]_. The highest and the lowest stress are the maximum of
 the concave function and the minimum of the convex function. The fit has no smoothing parameter, so
 it describes a sudden drop after linear loading as well as a gradual maximum of stress.
 
 A concave piecewise linear function with nodes at all samples has as many parameters as samples, but
-the constraint leaves only a few nodes at which the slope changes. The standard errors are those of
-a linear least-squares fit with these nodes. The actual standard deviation is up to two times
-smaller, because the constraint also reduces the variance.
+the constraint makes the slope change at only a few nodes. The standard errors are those of a linear
+least-squares fit with these nodes. The actual standard deviation is up to two times smaller,
+because the constraint also reduces the variance.
 
 References
 ----------
@@ -86,7 +86,7 @@ class _ConcaveFit(NamedTuple):
 
     @property
     def scaled_residuals(self) -> np.ndarray:
-        """Residuals of the samples, scaled because the parameters reduce their variance."""
+        """Residuals of the samples, corrected for the number of fitted parameters."""
         count = len(self.residuals)
         freedom = max(count - self.design_matrix.shape[1], 1)
         return np.asarray(self.residuals * math.sqrt(count / freedom))
@@ -120,7 +120,7 @@ class _ConcaveFit(NamedTuple):
         return 0.5 * (low + high), max(stderr, limits[2]), 0.5 * (high - low)
 
     def _remove_insignificant_slope_changes(self, variance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the design matrix and the values without insignificant changes of slope."""
+        """Return the design matrix and fitted values without insignificant slope changes."""
         columns, root = self.design_matrix, np.sqrt(self.weights)
         while True:
             inverse = np.linalg.pinv(columns * root[:, None])
@@ -135,9 +135,9 @@ class _ConcaveFit(NamedTuple):
     def _find_limits_of_maximum(
         self, values: np.ndarray, columns: np.ndarray, variance: float
     ) -> tuple[float, float, float]:
-        """Return the limits of the highest stress, and the standard error of the lower limit.
+        """Return limits of the highest stress, and the standard error of the lower limit.
 
-        Between two rows, the stress may be higher than both values. The concavity limits the
+        Between two rows, the stress may exceed the values at both rows. The concavity limits the
         stress to the lines through the two preceding rows and through the two following rows.
         """
         row = int(np.argmax(values))
@@ -222,7 +222,7 @@ def measure_stress_extrema(
 def _fit_longest_concave_part(
     time: np.ndarray, stress: np.ndarray, limits: tuple[float, float, float]
 ) -> _ConcaveFit | None:
-    """Fit a concave function to as many samples before a drop as it describes.
+    """Fit a concave function to the longest range of samples that it describes.
 
     The samples extend from the middle between two drops to the middle of the drop. The number of
     samples before the drop is halved until a concave function describes them within the noise.
@@ -264,8 +264,8 @@ def _fit_longest_concave_part(
 def _estimate_noise_variances(stress: np.ndarray) -> list[float]:
     """Estimate the variance of the noise from second differences.
 
-    The second differences do not contain the loading rate. Correlation of the noise increases the
-    variance of the means of blocks.
+    The second differences do not contain the loading rate. Correlated noise increases the variance
+    of block means.
 
     Returns
     -------
@@ -333,7 +333,7 @@ def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> 
 
 
 def _build_block_edges(count: int) -> np.ndarray:
-    """Return the edges of blocks whose length increases in proportion to the distance."""
+    """Return block edges whose spacing increases in proportion to the distance."""
     edges = [0]
     while edges[-1] < count:
         length = max(int(_BLOCK_SIZE_OVER_DISTANCE * edges[-1]), 1)

@@ -120,7 +120,7 @@ class HoldQuantityEstimate(NamedTuple):
     derivative_by_friction_trend: float = 0.0
 
     def subtract(self, other_estimate: HoldQuantityEstimate) -> HoldQuantityEstimate:
-        """Return the difference of two estimates."""
+        """Return the difference between two estimates."""
         return HoldQuantityEstimate(
             self.value - other_estimate.value,
             self.derivatives_by_coefficient - other_estimate.derivatives_by_coefficient,
@@ -234,7 +234,7 @@ class HoldFit:
         )
 
     def estimate_hold_quantities(self) -> tuple[list[float], list[float], list[float]]:
-        """Estimate friction before, during and after the hold, and derived quantities.
+        """Estimate the quantities of the hold, with their standard errors.
 
         Returns
         -------

@@ -362,7 +362,7 @@ class JointWindowModel:
     def compute_friction_change_by_loading_error(
         self, parameter_values: ParameterValues
     ) -> np.ndarray:
-        """Compute the changes in friction due to errors of the loading.
+        """Compute the changes in friction due to loading errors.
 
         Parameters
         ----------

@@ -1,17 +1,17 @@
 r"""Segmentation of rows into straight lines.
 
-Let :math:`S(i, j)` be the sum of squared residuals of the line through the rows i to j. Binary
+Let :math:`S(i, j)` be the sum of squared residuals of the line fitted to the rows i to j. Binary
 segmentation [1]_ [2]_ splits the rows at the row k that minimises :math:`S(i, k) + S(k, j)`. A
 split is accepted if it reduces the sum of squares by more than :math:`12 \ln(j - i)` times the
 noise variance, which is far more than expected by chance.
 
 If a range of rows contains several changes in slope, the first split is biased [3]_: it often lies
-a few rows from a change. A later split cannot separate the rows between the first split and the
-change, because a segment must have at least 5 rows. A false segment with an intermediate slope then
-spans the change. For this reason, the boundaries are refined afterwards. Each boundary moves to the
-row with the smallest sum of squares between the two neighbouring boundaries. Two neighbouring
-boundaries are replaced by a single boundary if the sum of squares of two lines is not significantly
-larger than the sum of squares of three lines.
+a few rows from a change. If the first split misses the change by fewer than 5 rows, later splits
+cannot correct it, because a segment must have at least 5 rows. A false segment with an intermediate
+slope then spans the change. For this reason, the boundaries are refined afterwards. Each boundary
+moves to the row between its two neighbouring boundaries that minimises the sum of squares. Two
+neighbouring boundaries are replaced by a single boundary if the sum of squares of two lines is not
+significantly larger than the sum of squares of three lines.
 
 References
 ----------
@@ -330,7 +330,7 @@ class SegmentBoundaryRefinement:
     def _find_single_boundary(
         self, start_row: int, first_boundary: int, second_boundary: int, stop_row: int
     ) -> int | None:
-        """Return a boundary that replaces two boundaries, or None if three lines fit better.
+        """Find a single boundary that can replace two boundaries.
 
         Boundaries that are more than ``max_rows`` apart are not replaced.
         """
@@ -353,7 +353,7 @@ class SegmentBoundaryRefinement:
 def _compute_squares_of_two_lines(
     sums: CumulativeSumsForLineFits, boundaries: np.ndarray, stop_row: int
 ) -> np.ndarray:
-    """Compute the sum of squared residuals of two lines for each boundary."""
+    """Compute the sum of squared residuals of two lines for each possible boundary."""
     return np.asarray(
         sums.compute_line_residual_squares(0, boundaries)
         + sums.compute_line_residual_squares(boundaries, stop_row)

@@ -197,7 +197,7 @@ class NoiseModel:
 
     @property
     def correlation_log_determinant(self) -> float:
-        """Logarithm of the determinant of the correlation matrix R."""
+        """Log-determinant of the correlation matrix R."""
         total = (
             0.0
             if self.correlation_from_averaging is None

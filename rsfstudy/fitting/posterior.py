@@ -202,8 +202,8 @@ def add_posterior_draws(
 ) -> Outcome:
     """Add posterior draws to the outcome of a fit.
 
-    If the sampler fails, the outcome keeps the values of the fit, and the message gives the reason
-    why there are no draws.
+    If the sampler fails, the outcome keeps the values of the fit, and the message explains why
+    there are no draws.
 
     Parameters
     ----------

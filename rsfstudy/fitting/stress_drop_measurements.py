@@ -318,11 +318,12 @@ def _measure_slip_of_drop(
 
 
 def _bound_sampling_error(rates: np.ndarray, fastest: int) -> float:
-    """Return an upper limit of the peak slip rate minus the largest mean slip rate.
+    """Bound the amount by which sampling underestimates the peak slip rate.
 
-    The mean slip rate over a sampling interval is smaller than the peak slip rate. If the slip rate
-    is a parabola near its peak, the difference is at most a third of the largest mean slip rate
-    minus the mean of the two neighbouring slip rates.
+    The mean slip rate over a sampling interval is smaller than the peak slip rate. The upper limit
+    of the difference is the largest mean slip rate minus the mean of the two neighbouring slip
+    rates. If the slip rate is a parabola near its peak, the difference is at most a third of this
+    limit.
 
     Parameters
     ----------
@@ -346,7 +347,7 @@ def _bound_sampling_error(rates: np.ndarray, fastest: int) -> float:
 def _find_successive_rates_above(
     rates: np.ndarray, fastest: int, threshold: float
 ) -> tuple[int, int]:
-    """Return the range of indices around the largest slip rate that exceed a threshold."""
+    """Return the range of indices around the peak with slip rates above a threshold."""
     slow = np.flatnonzero(rates <= threshold)
     after = int(np.searchsorted(slow, fastest))
     first = int(slow[after - 1]) + 1 if after else 0

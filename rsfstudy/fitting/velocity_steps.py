@@ -159,7 +159,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
 
 
 def _move_to_nearest_rows(step: LoadingStep, time: np.ndarray) -> LoadingStep:
-    """Move the ends of a step to a row if they differ from its time by rounding errors only.
+    """Move the ends of a step to the times of rows within the rounding error.
 
     Without the rounding errors, a row at the time of a step belongs to the same window of the
     record, whatever the order of the arithmetic operations is.
@@ -245,7 +245,7 @@ def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
 
 
 def _compute_least_noise(values: np.ndarray) -> float:
-    """Return the smallest standard deviation that is considered to be noise.
+    """Return the lower limit of the standard deviation of the noise.
 
     A synthetic record may have no noise except for the rounding errors of floating-point numbers.
     """
@@ -338,8 +338,8 @@ def _merge_similar_segments(
 def _compute_change_across_ramps(velocities: np.ndarray, row_counts: np.ndarray) -> np.ndarray:
     """Return the change in velocity at each boundary between segments.
 
-    A segment with few rows and an intermediate velocity is part of a ramp. At both of its
-    boundaries, the change in velocity is the change across the ramp.
+    A segment with few rows and an intermediate velocity is part of a ramp. Both of its boundaries
+    are assigned the change in velocity across the ramp.
     """
     changes = np.diff(velocities)
     across = np.abs(changes)

@@ -288,11 +288,10 @@ class LimitCycleSearch:
     def _should_extrapolate_to_fixed_point(self) -> bool:
         """Return True if the search should leap to the extrapolated fixed point.
 
-        The search does not leap to the extrapolated fixed point if the next cycle would come
-        equally close to the fixed point without a leap. The search also avoids long leaps, because
-        the motion may settle to steady sliding after a long leap. If a leap does not halve the
-        change in spring stress per cycle, no further leap follows, because repeated leaps may form
-        a loop.
+        If the next cycle would come equally close to the fixed point without extrapolation, the
+        search does not extrapolate. The search also avoids long leaps, because the motion may
+        settle to steady sliding after a long leap. If a leap does not halve the change in spring
+        stress per cycle, no further leap follows, because repeated leaps may form a loop.
         """
         cycle = self.cycles[-1]
         left = abs(

@@ -350,7 +350,7 @@ class ReturnMap:
     def compute_return_map_derivatives_per_cycle(
         self, start_section: np.ndarray, cycle_count: int, state_scale: float
     ) -> tuple[np.ndarray, ...]:
-        """Compute the derivatives of successive cycles by finite differences.
+        """Compute the Jacobian of the return map of each cycle by finite differences.
 
         Parameters
         ----------

@@ -191,7 +191,7 @@ def select_event_specs_that_can_occur(
 ) -> Sequence[EventSpecification]:
     """Select the requested events that can occur in a segment chain.
 
-    The motion can settle only in the last chain. Settling events are omitted if the load point
+    Only in the last chain can the motion settle. Settling events are omitted if the load point
     oscillates. If steady sliding is unstable, terminal settling events are also omitted, because
     these events would end the motion. See ``remove_settling_events_if_unstable`` for other settling
     events.

@@ -21,12 +21,12 @@ quantities are the attributes of a ``MotionPoint``. The attribute ``apparent_fri
 friction coefficient that a rig measures. You can request extrema of ``log_slip_rate``,
 ``spring_stress`` and ``apparent_friction``.
 
-In addition to the requested events, the table lists the start of the motion, each change of regime,
-the beginning of each loading segment, the end of the motion, and the end of the step in which the
-last requested sample was recorded. If an event occurs at the transition between two regimes or
-segments, it is reported at the beginning of the later regime or segment. If the scene has inertia,
-a rupture begins and ends with a change of regime (``EventKind.REGIME_CHANGE``), unless a loading
-segment begins or ends at the same time. If a motion cannot continue, the integration raises
+In addition to the requested events, the table lists the start and the end of the motion, each
+change of regime, the beginning of each loading segment, and the end of the step in which the last
+requested sample was recorded. If an event occurs at the transition between two regimes or segments,
+it is reported at the beginning of the later regime or segment. If the scene has inertia, a rupture
+begins and ends with a change of regime (``EventKind.REGIME_CHANGE``), unless a loading segment
+begins or ends at the same time. If a motion cannot continue, the integration raises
 ``MotionStopped`` with the reason.
 """
 

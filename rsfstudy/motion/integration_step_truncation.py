@@ -41,7 +41,7 @@ SEGMENT_END_CORRECTION_ITERATIONS = 2
 def is_step_end_valid(motion, workspace):
     """Return True if the motion is valid during at least part of the step.
 
-    If the motion terminates within the step, the function truncates the step at the termination.
+    If the motion terminates within the step, the function truncates the step at that point.
 
     Parameters
     ----------

@@ -298,7 +298,7 @@ def format_axis_label(
 
 
 def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
-    """Describe the value of a lattice cell along a dimension.
+    """Describe the coordinate value of a lattice cell along a dimension.
 
     Parameters
     ----------

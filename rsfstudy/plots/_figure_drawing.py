@@ -1,4 +1,4 @@
-"""Drawing and saving of the figures of study results.
+"""Functions that draw and save the figures of studies.
 
 The function ``draw_figure`` draws the figure that a study declares, a generic figure that can
 display any study, or a user-defined figure. The function ``save_figure`` writes the figure of a
@@ -201,7 +201,7 @@ def _find_row_index_of_panel(axes: Axes) -> int:
 
 
 def _add_header_with_notes(figure: Figure, dataset: xr.Dataset) -> None:
-    """Add a header that lists overridden settings, and missing and failed cells."""
+    """Add a header that lists overridden settings, missing cells and failed cells."""
     overrides = StoredDataset(dataset).study_declaration.overrides
     missing, is_warning = _format_note_on_missing_cells(dataset)
     lines = (

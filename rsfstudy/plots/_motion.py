@@ -292,7 +292,8 @@ def _format_axis_label_of_variable(variable: xr.DataArray) -> str:
 def _format_x_label(motion: xr.Dataset, x_variable: xr.DataArray) -> str:
     """Return the label of the x axis.
 
-    A protocol may have several steps, so the label of its time does not mention a single step.
+    The label of the time axis does not refer to one particular step, because a protocol may have
+    several steps.
     """
     label = _format_axis_label_of_variable(x_variable)
     has_protocol = bool(StoredDataset(motion).scene_fields.get("loading"))

@@ -100,8 +100,8 @@ def _to_matplotlib_style(user_style: Any) -> str | dict[str, Any]:
     """Convert a style to an argument of ``matplotlib.style.use``.
 
     The result is the name of a style or a dictionary of checked settings. Other styles are
-    rejected, because matplotlib would import a package for a dotted name, download a style sheet
-    from a URL, or parse any text file with one warning per line.
+    rejected. Otherwise, matplotlib would import a package if the style is a dotted name, download a
+    style sheet if it is a URL, or parse any text file and print a warning for each line.
     """
     if isinstance(user_style, Mapping):
         return _validate_matplotlib_settings(user_style)

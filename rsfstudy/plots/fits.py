@@ -170,8 +170,8 @@ def _iterate_columns_of_fit_windows(
 def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw a record with the fitted curves and their confidence bands.
 
-    If the record does not constrain a parameter, the confidence band would cover the panel, and is
-    therefore not drawn.
+    If the record does not constrain a parameter, the confidence band is not drawn, because it would
+    cover the panel.
     """
     windows: list[float] = []
     all_have_bands = True
@@ -220,7 +220,7 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def _is_identified(fit: xr.Dataset) -> bool:
-    """Return True unless the record does not constrain a parameter of a fit."""
+    """Return True unless the status of a fit is ``not_identified``."""
     return "status" not in fit or int(fit["status"]) != Status.NOT_IDENTIFIED
 
 

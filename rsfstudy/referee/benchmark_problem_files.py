@@ -219,7 +219,7 @@ class BenchmarkProblem:
     def answer_index_values(self) -> np.ndarray:
         """Values of the index column: times in s, or numbers of the peaks.
 
-        For an answer with a single row, the array contains the value 1.
+        If there is no index column, the only value is 1.
         """
         rows = self.times if self.report == "series" else range(1, max(self.count, 1) + 1)
         return np.array(rows, dtype=float)
@@ -491,7 +491,7 @@ def write_shipped_problems(directory: Path) -> int:
     """Write the shipped problems, their answers and templates to a directory.
 
     The function creates the folders ``problems``, ``answers`` and ``templates``, and the script
-    ``example.py``. A template is a table that contains the headings of an answer, but no values.
+    ``example.py``. A template is a table with the headings of an answer and no values.
 
     Parameters
     ----------

@@ -93,8 +93,8 @@ def _compare_laws_by_aic(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Yield a sentence that names the law with the lowest AIC.
 
     The sentence also states whether the AIC of the second-best law is significantly higher. If the
-    standard errors of one of both laws are not valid, the noise model is wrong and the difference
-    cannot be interpreted.
+    standard errors of either law are not valid, the noise model is wrong and the difference cannot
+    be interpreted.
     """
     invalid = {
         str(one["law"].item())

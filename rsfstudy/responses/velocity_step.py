@@ -235,9 +235,9 @@ class VelocityStep(RecordingMeasure):
     ) -> dict[str, float]:
         """Return the derivatives of the results with respect to friction.
 
-        The derivative is 1/ln r for a, b and a - b. The derivatives of slip distances are computed
-        for an exponential evolution of friction. When 1/e of the evolution b ln r remains, friction
-        changes by b ln r/(e D_c) per unit of slip.
+        The derivative is 1/ln r for a, b and a - b. The derivatives with respect to the slip
+        distances assume that friction evolves exponentially. When 1/e of the evolution b ln r
+        remains, friction changes by b ln r/(e D_c) per unit of slip.
         """
         evolved = values["apparent_b"] * log_velocity_ratio
         over_friction = math.e / evolved if evolved else math.nan

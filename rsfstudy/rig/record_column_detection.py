@@ -58,7 +58,7 @@ _COMMON_HEADING_PATTERN_BY_COLUMN = {
 
 
 class AcceptedRecordColumns(NamedTuple):
-    """Columns that are accepted by a function that reads records.
+    """Columns accepted by a function that reads records.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def read_selected_and_detected_columns(
     selected_columns: Mapping[str, Any] | None,
     accepted_columns: AcceptedRecordColumns,
 ) -> dict[str, Column]:
-    """Read the selected columns, and usable columns with common headings.
+    """Read the selected columns, and detect other columns by their headings.
 
     Parameters
     ----------

@@ -13,8 +13,8 @@ defined by
 
 While contacts heal, :math:`\ln V` decreases as the logarithm of displacement. When slip ends after
 a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. If displacement or time
-were the independent variable, many integration steps would be necessary, because each step could
-cover only a fraction of the elapsed or remaining interval. In contrast, the path length of such an
+were the independent variable, each integration step could cover only a fraction of the elapsed or
+remaining interval, so many steps would be necessary. In contrast, the path length of such an
 interval is only a few units. The change in :math:`\ln V` is divided by 6 because this reduces the
 number of integration steps near the largest slip rate. The direction of the path then changes over
 six units of :math:`\ln V` instead of one unit. Any divisor between 4 and 12 leads to a similar

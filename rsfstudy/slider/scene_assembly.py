@@ -1,4 +1,4 @@
-"""Assembly of the parts of a scene from its fields.
+"""Construction of the parts of a scene from its fields.
 
 The function ``build_scene_parts`` creates the parts, and ``build_field_lookup`` assigns each field
 to its part.

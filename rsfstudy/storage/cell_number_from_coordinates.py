@@ -65,7 +65,7 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
 def _find_index_on_axis(axis_values: np.ndarray, wanted_value: Any) -> int | None:
     """Find the index of the axis point with a given label or number.
 
-    A number selects the axis point with the nearest number. The relative difference between the two
+    A number selects the axis point with the nearest value. The relative difference between the two
     numbers must not exceed 1e-5.
     """
     if axis_values.dtype.kind in "iuf":

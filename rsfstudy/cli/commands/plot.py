@@ -38,7 +38,7 @@ from rsfstudy.study import list_study_names
 @options.abscissa_option
 @record_reading_options
 def plot(command_options: options.CommandOptions) -> int:
-    """Draw the figure of a study, of a motion or of a record.
+    """Draw the figure of a study, a motion or a record.
 
     NAME is the name of a study, or a file that contains results, a motion, a table of holds or a
     laboratory record. Records are read with the options of the command ``fit``. By default, the
@@ -72,7 +72,7 @@ def plot(command_options: options.CommandOptions) -> int:
 
 
 def _is_file_of_record(name: str | None) -> bool:
-    """Return True if a name is the path of a file that contains neither results nor a study."""
+    """Return True if a name is the path of a file other than results or a study."""
     if name is None or Path(name).suffix in (".nc", ".zarr", ".py") or not Path(name).is_file():
         return False
     return name not in list_study_names()

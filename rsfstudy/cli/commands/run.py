@@ -54,7 +54,7 @@ class StudyRunOutcome:
     reason_for_missing_results : str, optional
         Reason why the study was skipped, or error that ended the run.
     note_on_reused_cells : str, optional
-        Number of cells that an earlier run has stored, as a text.
+        Note on the number of cells that an earlier run has stored.
     """
 
     study_name: str
@@ -199,7 +199,7 @@ def run(command_options: options.CommandOptions) -> int:
 
 @contextlib.contextmanager
 def _name_complete_file_after_interrupt(runs: Sequence[StudyRunWithProgress]) -> Iterator[None]:
-    """Name the complete results file if an interrupt arrives after a study was computed."""
+    """Report the path of a complete results file if the run is interrupted."""
     try:
         yield
     except KeyboardInterrupt as error:

@@ -144,7 +144,7 @@ def verify(command_options: options.CommandOptions) -> int:
 
 
 def _print_verification(result: VerifyCommandResult) -> None:
-    """Print the correct digits of each quantity, and possible explanations."""
+    """Print the number of correct digits of each quantity, and reasons for disagreement."""
     from rsfstudy.referee import summarise_answer_comparisons
 
     for file, one in zip(

@@ -1,7 +1,7 @@
 r"""Normal stress that varies with shear stress.
 
-A driving stress inclined to the fault couples normal stress to shear stress. Changes in normal
-stress that the loading imposes are changes in :math:`\sigma_3`.
+A driving stress inclined to the fault couples normal stress to shear stress. If the loading imposes
+a change in normal stress, this is a change in :math:`\sigma_3`.
 """
 
 from __future__ import annotations

@@ -28,14 +28,13 @@ def build_result_quantities(
 ) -> dict[str, Quantity]:
     """Determine the quantities of the results of a reduction.
 
-    ``Reduction.fields_determining_result_units`` names one variable or two variables for each
-    result. If one variable is named, the result has the units and the scale of this variable. If
-    two variables are named, the units and the scale of the first variable are divided by the units
-    and the scale of the second variable. Results without an entry in
-    ``Reduction.fields_determining_result_units`` are dimensionless. If the scale varies between the
-    cells that were combined, the result has no scale, and a note is appended to the attribute
-    ``comment`` of the result. The description in the vocabulary is used only if its units and scale
-    agree with the units and scale of the result.
+    ``Reduction.fields_determining_result_units`` names one or two variables for each result. If one
+    variable is named, the result has the units and the scale of this variable. If two variables are
+    named, the units and the scale of the first variable are divided by the units and the scale of
+    the second variable. Results without an entry in ``Reduction.fields_determining_result_units``
+    are dimensionless. If the scale varies between the cells that were combined, the result has no
+    scale, and a note is appended to the attribute ``comment`` of the result. The description in the
+    vocabulary is used only if its units and scale agree with the units and scale of the result.
 
     Parameters
     ----------
