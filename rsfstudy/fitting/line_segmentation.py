@@ -333,6 +333,11 @@ class SegmentBoundaryRefinement:
         """Find a single boundary that can replace two boundaries.
 
         Boundaries that are more than ``max_rows`` apart are not replaced.
+
+        Returns
+        -------
+        int or None
+            First row after the boundary, or None if the two boundaries are not replaced.
         """
         if second_boundary - first_boundary > self.max_rows:
             return None
