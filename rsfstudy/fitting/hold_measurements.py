@@ -298,7 +298,10 @@ class HoldFit:
 
     @cached_property
     def _noise_reference_fit(self) -> GeneralisedLeastSquaresFit:
-        """Fit to rows without a friction peak, whose noise is used to select windows."""
+        """Fit to rows without a friction peak.
+
+        The noise of this fit is used to select windows.
+        """
         rows, after = self.hold.steady_rows_before_hold, self.rows_after
         if len(after) > 1:
             gaps = np.gradient(self.time)

@@ -61,7 +61,9 @@ def count_failed_cells_by_status(dataset: xr.Dataset) -> Mapping[str, int]:
 
 
 def find_failed_cells(dataset: xr.Dataset) -> xr.DataArray:
-    """Find the cells whose status is a failure. Cells that are not computed yet have not failed.
+    """Find the cells whose status is a failure.
+
+    Cells that have not been computed are not counted as failures.
 
     Parameters
     ----------
