@@ -1,8 +1,8 @@
 """Error boundary of the public functions and classes.
 
 Every exception raised by a public function is an instance of an rsfstudy error class. The error
-message contains the invalid argument, the rule that the argument breaks, and the remedy. Calls from
-within rsfstudy bypass the boundary, so that the error refers to the function that the user called.
+message contains the invalid argument, the rule that it violates, and a remedy. Calls from within
+rsfstudy bypass the boundary, so that the error refers to the function that the user called.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class ConstructorKeywordCheckMixin:
 def _list_constructor_parameters(inspected_class: type) -> tuple[str, ...]:
     """Return the parameter names of the constructor of a class.
 
-    The tuple is empty if the constructor accepts arbitrary keywords.
+    The tuple is empty if the constructor accepts arbitrary keyword arguments.
     """
     parameters = inspect.signature(inspected_class.__init__).parameters  # type: ignore[misc]
     takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())

@@ -118,7 +118,7 @@ def loading_time_line(row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
 
 
 def explain_lines(_results: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Write the meaning of the lines into a panel.
+    """Write an explanation of the lines in a panel.
 
     Parameters
     ----------

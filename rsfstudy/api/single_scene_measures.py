@@ -104,7 +104,7 @@ def critical_step(
 
     Under the slowness law at constant normal stress and :math:`k \ge k_{cr}`, every quasi-static
     motion stays bounded [1]_. The result is then the smallest step after which the slip rate
-    reaches the instability norm. It grows without limit with the norm.
+    reaches the instability norm. This step grows without limit as the norm increases.
 
     References
     ----------

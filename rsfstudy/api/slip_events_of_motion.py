@@ -213,9 +213,9 @@ class InterpolatorBetweenMotionRows:
     def _find_stress_drop_rows(self, first_row: int, last_row: int) -> tuple[int, int]:
         """Return the rows that contain the stress drop of an event.
 
-        Without noise, the two rows are the local maximum of shear stress before the event and the
-        local minimum after the event. With noise, they are the nearest rows before and after the
-        event in which the slip rate does not exceed the arrest level.
+        If the scene has no noise, the two rows are the local maximum of shear stress before the
+        event and the local minimum after the event. Otherwise, the two rows are the nearest rows
+        before and after the event at which the slip rate does not exceed the arrest level.
         """
         end, stress, rates = len(self._times) - 1, self._values[:, 2], self._values[:, 0]
         level, highest, lowest = self._arrest_slip_rate_level, first_row, last_row
@@ -252,8 +252,9 @@ class InterpolatorBetweenMotionRows:
     def _is_too_coarse_to_interpolate(self, rows: slice) -> bool:
         """Return True if rows are too far apart for interpolation.
 
-        Rows are too far apart if slip rate changes by more than half a decade between the rows.
-        Rows may be too far apart if the motion was computed at requested times only.
+        Rows are too far apart if the slip rate changes by more than half a decade between two
+        neighbouring rows. Large changes can occur if the motion was computed only at requested
+        times.
         """
         return bool(
             np.abs(np.diff(self._values[rows, 0])).max() > _MAX_LOG10_SLIP_RATE_CHANGE_PER_ROW

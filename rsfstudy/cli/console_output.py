@@ -28,7 +28,7 @@ class LiteralTextConsole(Console):
 
     @property
     def size(self) -> ConsoleDimensions:
-        """Size of the terminal, with a width that is limited to a fixed range.
+        """Size of the terminal, with the width limited to a fixed range.
 
         The environment variable ``COLUMNS`` overrides the width of the terminal. If the output is
         redirected and ``COLUMNS`` is not set, the width is 100 characters.

@@ -130,8 +130,8 @@ def _tolerate_lost_resource_tracker() -> None:
 def _close_client(dask_client: Any) -> None:
     """Close the client of a local cluster, even if its event loop has already ended.
 
-    Without an event loop, Dask cannot close the client, and the error would hide the results of the
-    run. Both the client and its cluster are then marked as closed.
+    If the event loop has ended, Dask cannot close the client, and the resulting error would hide
+    the results of the run. The client and its cluster are then only marked as closed.
     """
     from distributed.core import Status
 

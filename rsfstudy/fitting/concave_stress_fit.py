@@ -1,17 +1,17 @@
 """Highest stress before a stress drop, and lowest stress after a stress drop.
 
-The shear stress of a spring-slider increases during loading, and slip before the event reduces the
-loading rate until stress reaches a maximum and decreases. Therefore, stress is a concave function
-of time until the middle of the drop. Similarly, stress is a convex function of time after the
-middle of the drop. The function ``measure_stress_extrema`` fits a concave function and a convex
+The shear stress of a spring-slider increases during loading. Slip before the event reduces the rate
+of increase, until the stress reaches a maximum and decreases. Therefore, stress is a concave
+function of time until the middle of the drop. Similarly, stress is a convex function of time after
+the middle of the drop. The function ``measure_stress_extrema`` fits a concave function and a convex
 function to the samples by least squares [1]_. The highest and the lowest stress are the maximum of
 the concave function and the minimum of the convex function. The fit has no smoothing parameter, so
 it describes a sudden drop after linear loading as well as a gradual maximum of stress.
 
 A concave piecewise linear function with nodes at all samples has as many parameters as samples, but
 the constraint makes the slope change at only a few nodes. The standard errors are those of a linear
-least-squares fit with these nodes. The actual standard deviation is up to two times smaller,
-because the constraint also reduces the variance.
+least-squares fit with these nodes. The actual standard deviation is smaller by up to a factor of
+two, because the constraint also reduces the variance.
 
 References
 ----------
@@ -96,8 +96,8 @@ class _ConcaveFit(NamedTuple):
 
         The maximum of the concave function underestimates the stress before a sudden drop, because
         the function can follow the noise of the last samples downwards. Therefore, the function is
-        also fitted without the changes of slope that are not significant. The result is the middle
-        between the maxima of both functions.
+        also fitted without the insignificant changes of slope. Both fits give limits of the highest
+        stress, and the result is the midpoint of these limits.
 
         Parameters
         ----------
@@ -137,8 +137,8 @@ class _ConcaveFit(NamedTuple):
     ) -> tuple[float, float, float]:
         """Return limits of the highest stress, and the standard error of the lower limit.
 
-        Between two rows, the stress may exceed the values at both rows. The concavity limits the
-        stress to the lines through the two preceding rows and through the two following rows.
+        Between two rows, the stress may exceed the values at both rows. Because the function is
+        concave, the stress cannot exceed the extrapolated lines of the two neighbouring intervals.
         """
         row = int(np.argmax(values))
         if row == 0:  # Stress decreases throughout, so there is no maximum before the drop.
@@ -224,8 +224,9 @@ def _fit_longest_concave_part(
 ) -> _ConcaveFit | None:
     """Fit a concave function to the longest range of samples that it describes.
 
-    The samples extend from the middle between two drops to the middle of the drop. The number of
-    samples before the drop is halved until a concave function describes them within the noise.
+    The samples extend from the midpoint between the previous drop and this drop to the middle of
+    this drop. The number of samples before the drop is halved until a concave function describes
+    them within the noise.
 
     Parameters
     ----------
@@ -264,8 +265,8 @@ def _fit_longest_concave_part(
 def _estimate_noise_variances(stress: np.ndarray) -> list[float]:
     """Estimate the variance of the noise from second differences.
 
-    The second differences do not contain the loading rate. Correlated noise increases the variance
-    of block means.
+    A constant loading rate cancels in the second differences. Correlated noise increases the
+    variance of block means.
 
     Returns
     -------
@@ -342,7 +343,7 @@ def _build_block_edges(count: int) -> np.ndarray:
 
 
 def _bound_stress_between_rows(times: np.ndarray, values: np.ndarray, row: int) -> float:
-    """Return the upper limit of a concave function between a row and the next row."""
+    """Return an upper bound on a concave function between a row and the next row."""
     if not 0 < row < len(times) - 1:
         return -math.inf
     slopes = np.diff(values) / np.diff(times)

@@ -325,8 +325,8 @@ class HoldFit:
     def _choose_rows_of_hold_end(self) -> np.ndarray:
         """Return the rows of the window at the end of the hold.
 
-        Rows close to the start or the end of the hold are excluded, because the step times have
-        errors.
+        Rows close to the start or the end of the hold are excluded, because the step times are
+        uncertain.
         """
         time, begins, ends = (
             self.time,

@@ -1,4 +1,4 @@
-r"""Segmentation of rows into straight lines.
+r"""Piecewise linear segmentation of the rows of a record.
 
 Let :math:`S(i, j)` be the sum of squared residuals of the line fitted to the rows i to j. Binary
 segmentation [1]_ [2]_ splits the rows at the row k that minimises :math:`S(i, k) + S(k, j)`. A
@@ -10,8 +10,8 @@ a few rows from a change. If the first split misses the change by fewer than 5 r
 cannot correct it, because a segment must have at least 5 rows. A false segment with an intermediate
 slope then spans the change. For this reason, the boundaries are refined afterwards. Each boundary
 moves to the row between its two neighbouring boundaries that minimises the sum of squares. Two
-neighbouring boundaries are replaced by a single boundary if the sum of squares of two lines is not
-significantly larger than the sum of squares of three lines.
+neighbouring boundaries are replaced by a single boundary if three lines do not fit significantly
+better than two lines.
 
 References
 ----------
@@ -301,8 +301,8 @@ class SegmentBoundaryRefinement:
     def _sum(self, start_row: int, stop_row: int) -> CumulativeSumsForLineFits:
         """Return the cumulative sums of a range of rows, relative to its first row.
 
-        Sums of a short range have smaller rounding errors than differences between sums of all
-        rows.
+        Cumulative sums over a short range have smaller rounding errors than differences between
+        cumulative sums over all rows.
         """
         rows = slice(start_row, stop_row)
         return CumulativeSumsForLineFits(
@@ -315,8 +315,8 @@ class SegmentBoundaryRefinement:
         """Return the boundary of the two lines with the smallest sum of squares.
 
         The boundary does not move if the residuals of the two lines are much larger than the noise.
-        The sum of squares then depends on slow deviations from the lines, such as periodic errors
-        of a screw, and its minimum may be far from the change in slope.
+        In this case, slow deviations from the lines, such as periodic errors of a drive screw,
+        dominate the sum of squares, and its minimum may be far from the change in slope.
         """
         i, j = self._limit_rows(start_row, boundary, boundary, stop_row)
         at, sums = np.arange(MIN_SEGMENT_ROWS, j - i - MIN_SEGMENT_ROWS + 1), self._sum(i, j)

@@ -191,7 +191,7 @@ class NoiseModel:
     def prediction_coefficients_and_variances(self) -> list[tuple[list[list[float]], list[float]]]:
         """Prediction coefficients and error variances of each noise process.
 
-        The property contains one result of ``_run_levinson_durbin_recursion`` per noise process.
+        The list contains the result of ``_run_levinson_durbin_recursion`` for each noise process.
         """
         return [*map(_run_levinson_durbin_recursion, self.partial_autocorrelations)]
 
@@ -242,7 +242,7 @@ class NoiseModel:
 
     @property
     def _zero_frequency_power_over_variance(self) -> list[float]:
-        """Spectral power of each noise process at zero frequency, relative to variance."""
+        """Ratio of zero-frequency power to variance of each noise process."""
         told = ((c[-1], v[-1]) for c, v in self.prediction_coefficients_and_variances)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 

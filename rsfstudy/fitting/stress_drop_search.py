@@ -3,7 +3,7 @@
 The module ``stress_drop_detection`` detects the drops, and the module
 ``three_line_stress_drop_fit`` fits straight lines to each drop. The module ``concave_stress_fit``
 measures the highest stress before each drop and the lowest stress after each drop. The function
-``find_stress_drops`` calls these modules.
+``find_stress_drops`` uses these modules.
 """
 
 from __future__ import annotations
@@ -108,8 +108,8 @@ def _measure_drops(
 ) -> tuple[list[DetectedAndFittedStressDrop], Detection]:
     """Measure the highest and the lowest stress of each drop, and the noise between the drops.
 
-    Slow drops and the curvature of stress increase the noise estimate of the detection. The
-    residuals of the concave and convex fits contain only the noise.
+    The detection overestimates the noise if drops are slow or if stress does not change linearly
+    between the drops. The residuals of the concave and convex fits contain only the noise.
     """
     residual = float(np.median([of.fitted_drop.residual_sd for of in drops]))
     noise = min(detection.noise_sd, residual)

@@ -3,8 +3,8 @@
 The function ``fit_stress_drop`` models the stress before, during and after a drop by three
 connected straight lines. The lines meet at the times at which the drop begins and ends. For each
 pair of start time and end time, the lines are fitted by least squares. The fit with the smallest
-sum of squares determines the start and the end of the drop. The stresses at the start and at the
-end depend on the sampling interval if stress does not decrease suddenly. Therefore, the module
+sum of squares determines the start and the end of the drop. If the stress does not drop suddenly,
+the stresses at the start and at the end depend on the sampling interval. Therefore, the module
 ``concave_stress_fit`` replaces these stresses by the highest and the lowest stress.
 
 The confidence intervals of the start time and the end time are computed from the sums of squares.

@@ -161,8 +161,8 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
 def _move_to_nearest_rows(step: LoadingStep, time: np.ndarray) -> LoadingStep:
     """Move the ends of a step to the times of rows within the rounding error.
 
-    Without the rounding errors, a row at the time of a step belongs to the same window of the
-    record, whatever the order of the arithmetic operations is.
+    A row at the time of a step then belongs to the same window of the record, regardless of the
+    order of the arithmetic operations.
     """
 
     def move(at: float) -> float:

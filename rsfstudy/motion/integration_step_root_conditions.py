@@ -1,8 +1,8 @@
 """Conditions whose roots are located within a step.
 
 An event occurs when a function of time, for example a derivative of ln V, becomes zero. The end of
-a regime, a requested time and the termination of the motion are also represented by roots of
-functions, which are called conditions. If a condition changes sign between the ends of the step,
+a regime, a requested time and the termination of the motion are also roots of functions. These
+functions are called conditions. If a condition changes sign between the ends of the step,
 ``locate_sign_change`` finds the root with dense output.
 """
 
@@ -116,7 +116,7 @@ def may_any_event_be_reported_later(workspace):
 def compute_excess_over_switch_threshold(motion, workspace, point_columns):
     """Return the excess of the inertia effect over the slow-manifold limit.
 
-    The excess is at least zero if the motion must leave the slow manifold. In ruptures, and for
+    A non-negative excess means that the motion must leave the slow manifold. In ruptures, and for
     motions without inertia, the function returns -1.
 
     Parameters

@@ -228,9 +228,9 @@ def is_dense_output_accurate(motion, workspace):
     """Return True if the dense output of the step is accurate.
 
     The function compares the derivatives of dense output with the right-hand side at two points of
-    the step. Let h be the step size and e the error of dense output. The difference between the
-    derivatives is then the sum of two terms: a few times e/h, and the effect of e on the right-hand
-    side. If stability limits the step size, the two terms are of similar size.
+    the step. Let h be the step size and e the error of dense output. The derivatives then differ by
+    a few times e/h, plus the change in the right-hand side caused by e. If stability limits the
+    step size, the two terms are of similar size.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Scales, ticks and colours for the axes of a lattice.
 
 A lattice is the grid of all parameter combinations of a study, and the points of an axis are its
-parameter values. The functions in this module decide whether the points are numbers, whether the
-numbers need a log scale, and how the points are labelled.
+parameter values. The functions in this module determine whether the points are numbers, whether the
+axis needs a log scale, and how to label the points.
 """
 
 from __future__ import annotations

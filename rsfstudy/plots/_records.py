@@ -140,7 +140,7 @@ def _mark_steps_and_holds(record: Record, axes: Axes, x_name: str) -> None:
 
 
 def _write_step_numbers(record: Record, axes: Axes, x_name: str) -> None:
-    """Write the numbers of the steps at the upper edge of a panel, without overlaps."""
+    """Write the step numbers along the upper edge of a panel, without overlaps."""
     x = record.columns[x_name]
     least = _MIN_DISTANCE_OF_STEP_NUMBERS * float(np.ptp(axes.get_xlim()))
     previous = -np.inf

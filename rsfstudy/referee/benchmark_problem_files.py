@@ -217,7 +217,7 @@ class BenchmarkProblem:
 
     @property
     def answer_index_values(self) -> np.ndarray:
-        """Values of the index column: times in s, or numbers of the peaks.
+        """Values of the index column: times in s, or peak numbers.
 
         If there is no index column, the only value is 1.
         """

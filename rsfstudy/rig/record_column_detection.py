@@ -208,8 +208,8 @@ def _find_column_with_common_heading(column_name: str, table: LazyTable) -> dict
     """Find the column with a common heading for a quantity.
 
     If several headings match, headings with compatible units take precedence. Among headings with
-    compatible units, a heading that is equal to the name of the quantity takes precedence. The
-    function raises an error if several columns are still possible.
+    compatible units, a heading that is equal to the name of the quantity takes precedence. If
+    several headings remain, the function raises an error.
     """
     parts = {text: match for text in table.headings if (match := HEADING_PATTERN.fullmatch(text))}
     meant = [

@@ -17,7 +17,7 @@ were the independent variable, each integration step could cover only a fraction
 remaining interval, so many steps would be necessary. In contrast, the path length of such an
 interval is only a few units. The change in :math:`\ln V` is divided by 6 because this reduces the
 number of integration steps near the largest slip rate. The direction of the path then changes over
-six units of :math:`\ln V` instead of one unit. Any divisor between 4 and 12 leads to a similar
+an interval of 6 in :math:`\ln V` instead of 1. Any divisor between 4 and 12 leads to a similar
 number of steps.
 """
 

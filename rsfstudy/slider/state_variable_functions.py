@@ -2,9 +2,9 @@
 
 The tuple of states starts with the states of the law, whose sum acts on friction. If the loading
 changes normal stress, the unknowns of the loading follow the states of the law. The unknowns of a
-fluid are the last elements. The last unknown is the pore pressure P, or the stress that the loading
-imposes. Most functions of this module return other functions. The returned functions are
-specialised for the number of states, so that Numba can compile them.
+fluid come last. The last unknown is the pore pressure P, or the stress that the loading imposes.
+Most functions of this module return other functions. The returned functions are specialised for the
+number of states, so that Numba can compile them.
 """
 
 from __future__ import annotations

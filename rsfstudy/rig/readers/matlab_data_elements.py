@@ -78,7 +78,7 @@ def _decompress_variable(compressed_bytes: bytes) -> bytes:
 def _iterate_data_elements(element_bytes: bytes, byte_order: str) -> Iterator[_DataElement]:
     """Yield the data elements in a sequence of bytes.
 
-    The last element may lack the padding at its end.
+    The padding of the last element may be missing.
     """
     start = 0
     while start + _TAG_BYTES <= len(element_bytes):
