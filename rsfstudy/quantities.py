@@ -144,7 +144,7 @@ class Output(Quantity):
     optional: bool = False
 
     def __post_init__(self) -> None:
-        """Check that a description accompanies a symbol, units or a scale."""
+        """Check that an output with a symbol, units or a scale also has a description."""
         if not self.long_name and (self.symbol or self.scale or self.units != "1"):
             rule = "must not be empty, because the output has a symbol, units or a scale"
             raise InvalidValue(f"long_name of output {self.name!r}", self.long_name, rule)
@@ -173,7 +173,7 @@ def is_valid_variable_name(name: object) -> bool:
 
 
 def describe_invalid_variable_name(name: object) -> tuple[str, str]:
-    """Return the rule that an invalid variable name breaks, and a remedy."""
+    """Return the rule that an invalid variable name violates, and a suggested remedy."""
     if isinstance(name, str) and name.isidentifier():
         rule = "is not in Unicode normalisation form NFC"
         return rule, "Convert the name with unicodedata.normalize('NFC', name)."
@@ -356,7 +356,7 @@ def format_quantities_as_html_table(
 
 
 def _build_quantity_row(quantity: Quantity, value: object) -> tuple[object, ...]:
-    """Return the table row of a quantity, in the order of the headings."""
+    """Return the cells of the table row of a quantity, in the order of the headings."""
     return (
         quantity.name,
         format_symbol_as_html(quantity.symbol),
@@ -394,7 +394,7 @@ class HtmlTableMixin:
 
 
 def format_symbol_as_html(latex_symbol: str) -> HtmlText:
-    """Convert a symbol from LaTeX to HTML that needs no MathJax.
+    """Convert a LaTeX symbol to HTML that can be displayed without MathJax.
 
     Parameters
     ----------
@@ -467,7 +467,7 @@ def _format_html_table_cell(value: Any) -> str:
 
 
 def replace_comment_on_scales(attributes: Mapping[Any, Any], replacement: str) -> dict[Any, Any]:
-    """Replace the comment that describes the removed attribute ``scale``.
+    """Replace a comment on the ``scale`` attributes after these attributes were removed.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Corner plots of samples and cases.
 
 The function ``build_corner_figure`` builds a corner plot of the primary output and the sampled
-fields: a triangle of scatter plots with histograms on its diagonal. The points of the other axes of
-the study are shown in different colours.
+fields: a triangle of scatter plots with histograms on its diagonal. If the study has further axes,
+a different colour is used for each point along these axes.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _MAX_BINS, _MAX_LABEL_LINE_CHARACTERS = 30, 17
 
 
 class CornerFigure(Figure):
-    """Figure with panels in the lower triangle of a square.
+    """Figure whose panels form the lower triangle of a square grid.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class CornerFigure(Figure):
         return width, width if self.columns > 1 else height
 
     def align_x_axes_and_hide_inner_labels(self, axes_of_panels: Sequence[Axes]) -> None:
-        """Align the x axes of each column, and remove inner labels.
+        """Align the x axes in each column, and hide axis and tick labels between panels.
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class CornerFigure(Figure):
 
 
 def build_corner_figure(dataset: xr.Dataset, variable: str | None = None) -> CornerFigure | None:
-    """Build the corner plot of samples or cases.
+    """Build the corner plot of a study with samples or cases.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def _write_note_on_omitted_variables(
 
 
 def _list_sampled_fields_by_dimension(dataset: xr.Dataset) -> dict[str, list[str]]:
-    """Return the field names of each axis with numbered points, by dimension."""
+    """Return a mapping from the dimensions of axes with numbered points to field names."""
     found: dict[str, list[str]] = {}
     for axis in (stored.build_axis() for stored in StoredDataset(dataset).study_declaration.axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
@@ -262,7 +262,7 @@ def _build_scatter_or_histogram_panel(
 
 
 def _format_short_axis_label(dataset: xr.Dataset, variable_name: str) -> str:
-    """Return an axis label with symbol and units in short lines.
+    """Return an axis label with a symbol and units, broken into short lines.
 
     The lines of the label are short because the panels are small. In addition, matplotlib writes
     the power of ten of the tick labels next to the first line of the label.
@@ -288,7 +288,7 @@ def _limit_tick_count(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -
 def draw_histogram(
     variable_name: str, colour_dimensions: Sequence[str], dataset: xr.Dataset, axes: Axes
 ) -> None:
-    """Draw one histogram of a variable for each point of the other axes.
+    """Draw a histogram of a variable for each combination of points along other axes.
 
     Parameters
     ----------

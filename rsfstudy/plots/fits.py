@@ -1,4 +1,4 @@
-"""Figure of fits of laboratory records.
+"""Figure that shows fits to laboratory records.
 
 The first panels show the records with the fitted curves. For the first record, further panels show
 the residuals, the autocorrelation of the residuals, and the correlations of the parameters.
@@ -50,7 +50,7 @@ _DISPLACEMENT_LABEL = r"Load point displacement ($\mu$m)"
 
 
 def build_fit_panels(dataset: xr.Dataset) -> Sequence[Panel]:
-    """Build the panels of the figure of a fit.
+    """Build the panels of a figure that shows fits to laboratory records.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def build_fit_panels(dataset: xr.Dataset) -> Sequence[Panel]:
 
 
 def _format_record_title(record_count: int, dataset: xr.Dataset) -> str:
-    """Return the name of the record if there are several records."""
+    """Return the name of the record, or an empty string if there is only one record."""
     if record_count == 1:
         return ""
     return (
@@ -112,14 +112,14 @@ def _format_record_title(record_count: int, dataset: xr.Dataset) -> str:
 
 
 def _format_loading_step_title(dataset: xr.Dataset) -> str:
-    """Return the title of the first step if there are several steps."""
+    """Return the title of the first step, or an empty string if there is no dimension ``step``."""
     if "step" not in dataset.dims:
         return ""
     return f"Step {dataset['step'].values[0]:g}{_format_step_count_in_parentheses(dataset)}"
 
 
 def _format_step_count_in_parentheses(dataset: xr.Dataset) -> str:
-    """Return the number of steps in parentheses if there are several steps."""
+    """Return the number of steps in parentheses, or an empty string for a single step."""
     return f" (of {dataset.sizes['step']})" if dataset.sizes.get("step", 1) > 1 else ""
 
 
@@ -129,7 +129,7 @@ def _iterate_fits_and_law_descriptions(
     """Iterate over the fits of a record.
 
     Each item contains the results of a fit, the description of the friction law, and the index of
-    the friction law. If ``only_first_step`` is True, only the fits of the first step are included.
+    the friction law. If ``only_first_step`` is True, only the fits to the first step are included.
     """
     steps = range(1 if only_first_step else dataset.sizes.get("step", 1))
     for number in range(dataset.sizes["law"]):
@@ -143,7 +143,7 @@ def _iterate_fits_and_law_descriptions(
 def _extract_thinned_columns_of_fit(
     fit: xr.Dataset, column_names: Sequence[str]
 ) -> list[np.ndarray]:
-    """Return the columns of a fit without rows that have missing values.
+    """Return selected columns of a fit, without the rows that contain missing values.
 
     If the columns have many rows, some rows are omitted at regular intervals.
     """
@@ -157,8 +157,8 @@ def _iterate_columns_of_fit_windows(
 ) -> Iterator[list[np.ndarray]]:
     """Iterate over the windows of a fit.
 
-    Each item is a list with the columns of a window. A window is a series of consecutive rows with
-    values and with increasing times.
+    Each item is a list of arrays, one array per column. A window is a sequence of consecutive rows
+    that contain values and have increasing times.
     """
     rows = np.flatnonzero(fit[column_names[-1]].notnull().values)
     late = np.diff(fit["record_time"].values[rows]) > 0.0
@@ -294,7 +294,7 @@ def _compute_autocorrelation(residuals: np.ndarray) -> np.ndarray:
 
 
 def _pair_laws_with_correlations(dataset: xr.Dataset) -> list[tuple[int, ...]]:
-    """Return the indices of the friction laws in each panel of correlations.
+    """Return a list with the indices of the friction laws for each correlation panel.
 
     Each panel shows two laws, or one law if the number of laws is odd. Laws without correlations in
     the first step are omitted.
@@ -308,7 +308,7 @@ def _pair_laws_with_correlations(dataset: xr.Dataset) -> list[tuple[int, ...]]:
 
 
 def _format_correlation_title(dataset: xr.Dataset, law_numbers: Sequence[int] = (0,)) -> str:
-    """Return the title of the correlation panel with the first step and friction law names."""
+    """Return the title of a correlation panel, with the first step and the names of the laws."""
     step = f", step {dataset['step'].values[0]:g}" if "step" in dataset.dims else ""
     laws = [describe_point(dataset.isel(law=n), "law") for n in law_numbers]
     if len(laws) == 1:
@@ -318,7 +318,7 @@ def _format_correlation_title(dataset: xr.Dataset, law_numbers: Sequence[int] = 
 
 
 def _format_parameter_symbol(parameter_name: str) -> str:
-    """Return the symbol of a parameter, with the window number if it has one."""
+    """Return the symbol of a parameter, including the window number in its name, if any."""
     plain, number = split_window_number(parameter_name)
     symbol = PARAMETERS[plain].symbol
     return f"{symbol[:-1]}^{{({number})}}$" if number else symbol
@@ -330,8 +330,8 @@ def _draw_parameter_correlation_matrix(
     """Draw the correlation matrix of the parameters of one or two friction laws.
 
     The lower triangle of the matrix shows the fit of the first friction law, and the upper triangle
-    shows the fit of the second friction law. Parameters without correlations in both fits are
-    omitted.
+    shows the fit of the second friction law. A parameter is omitted if neither of the two fits
+    contains correlations for this parameter.
     """
     fits = [one for one, *_ in _iterate_fits_and_law_descriptions(dataset, only_first_step=True)]
     lower, upper = (fits[law_numbers[n]]["correlation"].values for n in (0, -1))

@@ -155,7 +155,7 @@ class AnswerComparison:
 
 
 def _format_time_or_peak_number_of_row(problem: BenchmarkProblem, row: int) -> str:
-    """Format the value in the index column of a row, with units."""
+    """Format the time (with units) or the peak number that identifies a row."""
     units = {"time": " s"}.get(problem.answer_index_column_name, "")
     return f"{problem.answer_index_column_name} = {problem.answer_index_values[row]:g}{units}"
 
@@ -266,8 +266,8 @@ def compare_answers(
 def round_digit_count_down(digit_count: float) -> float:
     """Round a number of digits down to one decimal place.
 
-    The number is rounded down, so that the displayed number of a failed answer is always less than
-    the required number.
+    An answer fails if it has fewer correct digits than required. Because the number is rounded
+    down, the displayed number is then also less than the required number.
 
     Parameters
     ----------
@@ -371,7 +371,7 @@ def _iterate_answers_in_other_conventions(
     reported_answer: AnswerValuesByQuantity,
     known_answer: AnswerValuesByQuantity,
 ) -> Iterator[tuple[str, AnswerValuesByQuantity]]:
-    """Iterate over copies of an answer, converted from other conventions.
+    """Iterate over copies of an answer, each converted from a different convention.
 
     Each item contains a description of a convention, and the columns of the converted answer.
     """
@@ -412,7 +412,7 @@ def _iterate_answers_in_other_conventions(
 
 
 def _find_common_conversion_factor(factor: float, rtol: float) -> tuple[str, float] | None:
-    """Find a well-known conversion factor that matches a given factor.
+    """Find the common conversion factor that matches a given factor.
 
     The relative difference between the given factor and the common conversion factor must not
     exceed the tolerance.

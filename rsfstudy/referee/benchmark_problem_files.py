@@ -226,7 +226,7 @@ class BenchmarkProblem:
 
     @property
     def answer_column_headings(self) -> list[str]:
-        """Headings of the columns of the answer, with units."""
+        """Column headings of the answer table, with units."""
         return [f"{name} ({self.si_units_by_quantity[name]})" for name in self.answer_column_names]
 
     @cached_property

@@ -136,7 +136,7 @@ def _derive_from_reported_equivalent(
     problem: BenchmarkProblem,
     reported_quantities: Mapping[str, ReportedQuantity],
 ) -> np.ndarray:
-    r"""Compute a requested quantity from its substitute.
+    r"""Compute a requested quantity from an equivalent reported quantity.
 
     The slip rate is computed from its decimal logarithm. The friction coefficient is computed from
     the shear stress :math:`\tau` of the spring as :math:`\mu = (\tau - \eta V)/\sigma`.

@@ -76,7 +76,7 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
 
 
 def _summarise_table(dataset: xr.Dataset) -> Iterator[SummaryTableOrSentence]:
-    """Yield the summary of a table of holds, events, steps or other rows."""
+    """Yield the summary of a table whose rows are, for example, holds, events or steps."""
     if is_hold_table(dataset):
         yield from summarise_holds(dataset)
         return
@@ -100,7 +100,7 @@ def _summarise_table(dataset: xr.Dataset) -> Iterator[SummaryTableOrSentence]:
 
 
 def _format_table_value(value: xr.DataArray) -> str:
-    """Format a number or a string of a table. NaN is formatted as a dash."""
+    """Format a number or a string for a table. NaN is formatted as a dash."""
     if value.dtype.kind in "iu":
         return str(value.item())
     if value.dtype.kind == "f":
@@ -150,7 +150,7 @@ def is_motion_dataset(dataset: xr.Dataset) -> bool:
 
 
 def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
-    """Describe the scene or the lattice of a dataset, and the provenance.
+    """Describe the scene or the lattice of a dataset, and the provenance of the dataset.
 
     Parameters
     ----------

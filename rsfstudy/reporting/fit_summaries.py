@@ -200,7 +200,8 @@ def _describe_fit_window(fit: xr.Dataset) -> str:
 def format_parameter_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
     """Format the value of a fitted parameter with its standard error.
 
-    The value and the error are rounded to two significant digits of the error.
+    The error is rounded to two significant digits, and the value is rounded to the same decimal
+    place.
 
     Parameters
     ----------
@@ -224,7 +225,8 @@ def format_parameter_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
 def format_value_with_stderr(value: float, stderr: float) -> str:
     """Format a value with its standard error.
 
-    The value and the error are rounded to two significant digits of the error.
+    The error is rounded to two significant digits, and the value is rounded to the same decimal
+    place.
 
     Parameters
     ----------

@@ -228,7 +228,7 @@ def build_fit_table(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def _read_declared_steps(dataset: xr.Dataset) -> tuple[int | str, bool]:
-    """Return the declared steps of a fit, and True for a joint fit.
+    """Return the declared steps of a fit, and a flag that is True for a joint fit.
 
     The steps of a joint fit are returned as a string, for example "1, 2". The string is empty if
     the dataset has no declaration.

@@ -121,7 +121,7 @@ def summarise_file_as_json_fields(dataset: xr.Dataset, file: str) -> dict[str, A
 
 
 def _list_table_rows(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the values of each variable of a table, as a list or a number."""
+    """Return a mapping from the variable names of a table to lists or single values."""
     return {str(name): values.values.tolist() for name, values in dataset.variables.items()}
 
 

@@ -87,7 +87,7 @@ def format_number_or_dash(value: float, format_specification: str = ".8g") -> st
 
 
 def format_rounded_to_error(value: float, error: float) -> str:
-    """Format a number, rounded to two significant digits of its error.
+    """Format a number, rounded to the place of the second significant digit of its error.
 
     Parameters
     ----------

@@ -50,8 +50,8 @@ def compute_log_slip_rate_slope_along_path(
 ) -> float:
     """Compute the growth rate of ln V at an event with respect to path length.
 
-    During a rupture, the independent variable is the path length computed with the inertial time.
-    The growth rate is converted to the unit of path length that is used between ruptures.
+    During a rupture, path length is defined with inertial time instead of displacement. In this
+    case, the growth rate is converted to the path length that is used between ruptures.
 
     Parameters
     ----------
@@ -85,10 +85,10 @@ def compute_log_slip_rate_slope_along_path(
 
 
 def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
-    """Return a quantity whose events coincide with events of friction.
+    """Choose the quantity in which events of the friction coefficient are detected.
 
-    If normal stress is constant and the law is not regularised, events of the friction coefficient
-    coincide with events of the spring stress.
+    If normal stress is constant and the law is not regularised, the spring stress differs from the
+    friction coefficient only by a constant. The events are then detected in the spring stress.
 
     Parameters
     ----------

@@ -197,9 +197,10 @@ def estimate_error_at_instant(
 ) -> float:
     r"""Estimate the error of a result that is read at a single instant.
 
-    If the machine is stiff, numerical stability limits the time steps, and two runs may have the
-    same error at a single instant by chance. The error estimate therefore includes a fraction of
-    the result, and a fraction of the friction coefficient from which the result is read.
+    If the machine is stiff, numerical stability limits the time steps. Two runs may then have the
+    same error at a single instant by chance. The error estimate therefore also includes a small
+    fraction of the result, and the effect of a small error in the friction coefficient from which
+    the result is read.
 
     Parameters
     ----------

@@ -143,9 +143,9 @@ class Healing(RecordingMeasure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.
 
-        The scale of healing and relaxation is the absolute value plus the direct effect parameter
-        ``a``, because friction changes by ``a`` if ln V changes by one. The scale of the peak
-        displacement is the absolute value plus D_c.
+        For healing and relaxation, the scale is the absolute value of the result plus the direct
+        effect parameter ``a``, which is the change in friction for a unit change in ln V. For the
+        peak displacement, the scale is the absolute value of the result plus D_c.
 
         Parameters
         ----------
@@ -260,7 +260,7 @@ class Healing(RecordingMeasure):
     def _compute_outputs_along_record(
         self, scene: Scene, recorded_motion: RecordedMotion
     ) -> dict[str, np.ndarray]:
-        """Return the quantities recorded since the beginning of the hold, by phase."""
+        """Return the quantities recorded since the start of the hold, along ``phase``."""
         path = resample_motion_along_path(
             recorded_motion.recorded_rows, self.phases, MotionRecorder.RECORDED_VARIABLE_NAMES
         )

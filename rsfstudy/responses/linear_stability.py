@@ -144,9 +144,9 @@ class LinearStability(Measure):
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Stiffness field of the scene, whose value is ignored unless it is needed.
+        """Scene fields whose values are ignored: ``stiffness_ratio``, or no field.
 
-        The value is needed only to compute the growth rate.
+        If the growth rate is requested, the value of the stiffness is used and the tuple is empty.
         """
         return () if self.growth_rate else ("stiffness_ratio",)
 

@@ -65,13 +65,15 @@ class RigidResponse(Measure):
     r"""Stress as a function of slip after a slip rate step of a rigid slider.
 
     The slip rate of the slider changes suddenly from V_* to V, and the ratio V/V_* is the field
-    ``load_velocity_ratio`` of the scene. The direct effect changes the stress by ``a sigma
-    ln(V/V_*)`` at the step. The stress then evolves with slip towards steady sliding at V.
+    ``load_velocity_ratio`` of the scene. At the step, the direct effect changes the stress by the
+    product of ``a``, ``sigma`` and ``ln(V/V_*)``. The stress then evolves with slip towards steady
+    sliding at V.
 
     ``evolution_distance`` is the slip after which the difference between the stress and its steady
     value has decreased to 1/e of the initial difference. Under the slip law, ``evolution_distance``
-    is D_c. The outputs ``shear_stress``, ``normal_stress_ratio`` and ``state_variable`` have the
-    shape (points,), along ``slip``. Slip is in units of D_c, and stresses are in units of sigma_*.
+    is D_c. The outputs ``shear_stress``, ``normal_stress_ratio`` and ``state_variable`` are arrays
+    of shape (points,) along the dimension ``slip``. Slip is in units of D_c, and stresses are in
+    units of sigma_*.
 
     Parameters
     ----------
@@ -141,7 +143,7 @@ class RigidResponse(Measure):
         """Return the scale of the numerical error of the evolution distance.
 
         The scale is the sum of two terms: the evolution distance, and the change in evolution
-        distance if friction changes by the direct effect parameter ``a``.
+        distance that results from a change in friction equal to the direct effect parameter ``a``.
 
         Parameters
         ----------

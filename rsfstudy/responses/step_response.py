@@ -124,7 +124,7 @@ class StepResponse(RecordingMeasure):
 
     @property
     def output_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Coordinate values of the peaks (numbers from 1) and of ``phase``."""
+        """Values of the coordinates ``peak`` (peak numbers, counted from 1) and ``phase``."""
         return {"peak": np.arange(1, self.peaks + 1), **super().output_coordinates}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:

@@ -125,9 +125,9 @@ class VelocityStep(RecordingMeasure):
     and therefore show the effect of a soft machine.
 
     ``settled`` is 1 if friction varies by less than a hundredth of the direct effect over the last
-    tenth of the record, and if small perturbations of steady sliding do not grow. Otherwise
-    ``settled`` is 0. If the largest growth rate of small perturbations is zero within its error,
-    ``settled`` is NaN.
+    tenth of the record, and if small perturbations of steady sliding do not grow. Otherwise the
+    output ``settled`` is 0. If the largest growth rate of small perturbations is zero within its
+    error, the output ``settled`` is NaN.
 
     If friction has no extremum after the step, or if ``b`` is smaller than its error, the status is
     ``not_applicable``, and the outcome contains only the available results. Distances are in units
@@ -210,8 +210,8 @@ class VelocityStep(RecordingMeasure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.
 
-        The scale is the absolute value of the result, plus the change of the result if friction
-        changes by the direct effect parameter ``a``.
+        The scale is the sum of two terms: the absolute value of the result, and the change in the
+        result due to a change in friction equal to the direct effect parameter ``a``.
 
         Parameters
         ----------
@@ -235,9 +235,10 @@ class VelocityStep(RecordingMeasure):
     ) -> dict[str, float]:
         """Return the derivatives of the results with respect to friction.
 
-        The derivative is 1/ln r for a, b and a - b. The derivatives with respect to the slip
-        distances assume that friction evolves exponentially. When 1/e of the evolution b ln r
-        remains, friction changes by b ln r/(e D_c) per unit of slip.
+        The derivative is 1/ln r for a, b and a - b. The derivatives of the slip distances with
+        respect to friction are based on an exponential evolution of friction by the total amount
+        b ln r. At the point at which 1/e of this amount remains, friction changes by
+        b ln r/(e D_c) per unit of slip.
         """
         evolved = values["apparent_b"] * log_velocity_ratio
         over_friction = math.e / evolved if evolved else math.nan
@@ -372,9 +373,9 @@ class VelocityStep(RecordingMeasure):
 
         At this event, the difference between friction and its final value is 1/e of the difference
         at the extremum of friction. The time and slip of the event are measured from this extremum.
-        A separate integration starts at the extremum of friction, because friction may cross the
-        level of the event both before and after the extremum within a single recorded integration
-        step.
+        A separate integration starts at the extremum of friction. A search of the recorded steps
+        could fail, because friction may cross the level of the event both before and after the
+        extremum within a single step.
         """
         peak = recorded_motion.peak_event
         if peak is None or not peak.time < recorded_motion.end_event.time:
@@ -392,7 +393,7 @@ class VelocityStep(RecordingMeasure):
     def _compute_outputs_along_record(
         self, scene: Scene, evaluated_step: _EvaluatedVelocityStep, recorded_motion: RecordedMotion
     ) -> dict[str, float | np.ndarray]:
-        """Return the record, ``settled`` and the closed-form departure."""
+        """Return the recorded quantities, the flag ``settled`` and the closed-form departure."""
         rows, friction = (
             recorded_motion.recorded_rows,
             MotionRecorder.get_friction_coefficient(recorded_motion.recorded_rows),

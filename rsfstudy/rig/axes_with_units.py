@@ -128,8 +128,9 @@ def _convert_axis_rows_to_common_units(
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """Convert the rows of an axis to numbers and return their units.
 
-    The function converts field names to their names on axes. The units of a field are, in order of
-    priority, the units of the axis, the units of the first value of the column, or SI units.
+    The function replaces field names by the corresponding axis names. The units of a field are, in
+    order of priority, the units of the axis, the units of the first value of the column, or SI
+    units.
     """
     found: list[dict[str, Any]] = [{} for _row in axis_rows]
     units_by_name: dict[str, str] = {}
@@ -205,7 +206,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
 
 
 def _is_positive_if_required(quantity_name: str, number: Any) -> bool:
-    """Return False if a quantity that must be positive is not positive."""
+    """Return True if a quantity is positive or is not required to be positive."""
     return quantity_name not in RIG_QUANTITY_BY_AXIS_NAME or (
         isinstance(number, float) and number > 0.0
     )

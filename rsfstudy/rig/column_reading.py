@@ -1,4 +1,4 @@
-"""Reading options and columns shared by all functions that read records.
+"""Options and column selection shared by all functions that read records.
 
 The functions `read_record`, `events` and `history` use different columns of a file. `read_columns`
 reads the columns that one of these functions can use, from a source in any format.
@@ -89,7 +89,7 @@ class RecordReadingOptions(RowSelection):
 
 
 class ColumnsReadFromSource(NamedTuple):
-    """Selected columns of a source, with their table.
+    """Selected columns of a source, and the table that contains them.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def read_columns(
     accepted_columns: AcceptedRecordColumns,
     reading_options: RecordReadingOptions,
 ) -> ColumnsReadFromSource:
-    """Read those columns of a source that the calling function can use.
+    """Read the columns of a source that the calling function accepts.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Conversion of datasets between dimensionless and physical units.
 
-The attribute ``scale`` of a dimensionless variable, for example ``D_c/V_*``, is the unit of the
-variable. The main function `convert_dataset_units` multiplies variables by the scales from
-`read_si_scales`.
+The attribute ``scale`` of a dimensionless variable contains the unit in which the variable is
+expressed, for example ``D_c/V_*``. The main function `convert_dataset_units` multiplies variables
+by the scales from `read_si_scales`.
 """
 
 from __future__ import annotations

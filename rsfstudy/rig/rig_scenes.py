@@ -85,7 +85,7 @@ class RigAxesToScenesConverter:
                     )
 
     def _derive_scene_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
-        """Compute scene fields from the rig, without heating if the base is isothermal."""
+        """Compute scene fields from rig values, omitting heating if the scene is isothermal."""
         hot = self.base_scene.parts.temperature.name != "isothermal"
         return derive_scene_fields_from_rig(rig_values, with_shear_heating=hot)
 
@@ -295,7 +295,7 @@ def convert_scene_and_axes_to_rig_units(
 def replace_rig_quantity(
     rig: Rig, base_scene: Scene, quantity_name: str, value: Any
 ) -> tuple[Rig, Scene]:
-    """Return a rig and a scene in which one quantity has another value.
+    """Return a rig and its scene after the value of one quantity has been replaced.
 
     Parameters
     ----------

@@ -159,7 +159,7 @@ class RowSelection:
     def filter_and_thin_columns(
         self, columns: Mapping[str, np.ndarray], filtered_column_names: Sequence[str]
     ) -> tuple[dict[str, np.ndarray], list[str]]:
-        """Filter friction or stress, and keep every ``thin``-th row.
+        """Filter friction or stress, and keep only one of every ``thin`` rows.
 
         Parameters
         ----------

@@ -84,8 +84,8 @@ def compute_state_evolution_derivatives(
     r"""Compute the derivatives of the state evolution in steady sliding.
 
     The step size of the finite differences is halved until two successive estimates agree. The
-    derivatives are therefore accurate even for a law whose state evolution varies strongly over
-    changes in :math:`\ln V` of less than 1.
+    derivatives are therefore accurate even if the state evolution varies strongly when
+    :math:`\ln V` changes by less than 1.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def _compute_central_differences_at_zero(
 def _compute_finite_difference_scales(
     scene: SceneView, steady_state: SteadySliding, stress_induced_state_shift: float
 ) -> list[float]:
-    """Return the finite-difference scales of ln V, the shift and each state."""
+    """Return the scales of the finite differences in ln V, the shift and each state."""
     size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.steady_state_change_per_log_rate_over_a
     # If the law has several states, the sum of all b may be close to zero even if each b is large.
     of_shift = (

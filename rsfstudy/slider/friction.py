@@ -292,7 +292,7 @@ def compute_effective_normal_stress(
 def build_state_evolution_function(
     scene: SceneView,
 ) -> Callable[[float, FloatTuple, float], FloatTuple]:
-    """Return the state evolution of a scene as a function.
+    """Return a function that computes the state evolution of a scene.
 
     Parameters
     ----------

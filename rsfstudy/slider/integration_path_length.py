@@ -16,9 +16,9 @@ a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. If di
 were the independent variable, each integration step could cover only a fraction of the elapsed or
 remaining interval, so many steps would be necessary. In contrast, the path length of such an
 interval is only a few units. The change in :math:`\ln V` is divided by 6 because this reduces the
-number of integration steps near the largest slip rate. The direction of the path then changes over
-an interval of 6 in :math:`\ln V` instead of 1. Any divisor between 4 and 12 leads to a similar
-number of steps.
+number of integration steps near the largest slip rate. With this divisor, the direction of the path
+changes more gradually, over a change of 6 in :math:`\ln V` instead of 1. Any divisor between 4 and
+12 leads to a similar number of steps.
 """
 
 from __future__ import annotations

@@ -199,7 +199,7 @@ def _build_table_of_mapping(mapping: Any, keys: list[Any], headings: list[str]) 
 
 
 def _convert_to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
-    """Convert an array to floats, and return the units that follow from its type.
+    """Convert an array to floats, and return the units implied by the type of the array.
 
     Masked values become NaN. Times are converted to seconds. Dates are converted to seconds since
     the first date.

@@ -42,8 +42,10 @@ def is_matlab_file(source: TableSource) -> bool:
 def read_matlab_file(source: TableSource) -> LazyTable:
     """Read the numeric arrays of a MATLAB file.
 
-    The columns of the table are the vectors and the columns of matrices. The headings are the names
-    of the variables. Fields of structures have headings such as ``data.time``.
+    Each vector and each column of a matrix becomes a column of the table. The headings are the
+    names of variables and structure fields. The columns of a matrix are numbered, as in ``data_1``.
+    If several fields have the same name, the headings include the names of the structures, as in
+    ``data.time``.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ class TableSource:
 
 @dataclass(frozen=True, eq=False)
 class LazyTable:
-    """Columns of a source, which are converted to numbers when selected.
+    """Table of a source, whose columns are converted to numbers only when they are selected.
 
     Parameters
     ----------

@@ -254,7 +254,7 @@ def _iterate_header_splits_at_blanks(text: str) -> Iterator[list[str]]:
 
 
 def _append_bracketed_units_to_words(words: Sequence[str]) -> list[str]:
-    """Append units in brackets to the words before the units."""
+    """Join each word with the bracketed units that follow the word."""
     groups: list[list[str]] = []
     depth = 0
     for word in words:

@@ -44,8 +44,9 @@ def read_xlook_file(source: TableSource) -> LazyTable:
     """Read a binary xlook file.
 
     The file is big-endian. The file contains a file header, column headers of 84 bytes each, and
-    one float32 array per column. In xlook files, the column ``time`` contains sampling intervals.
-    The function replaces this column by the cumulative sum of the intervals.
+    one float32 array per column. In xlook files, the column named ``time`` contains sampling
+    intervals instead of times. The function replaces this column by the cumulative sum of the
+    intervals.
 
     Parameters
     ----------

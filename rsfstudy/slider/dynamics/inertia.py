@@ -122,9 +122,9 @@ def build_slow_manifold_slip_rate_functions(
     def inertial_stress(
         spring_stress: float, psis: FloatTuple, alone: FloatTuple, p: FloatTuple
     ) -> float:
-        """Compute the stress in sigma_* that accelerates the mass.
+        """Compute the stress that accelerates the mass, in units of sigma_*.
 
-        The argument for the quasi-static motion is the tuple returned by ``quasi_static_values``.
+        The quasi-static motion is passed as the tuple that ``quasi_static_values`` returns.
         """
         x, growing, slope, weight, _shift = alone
         first = compute_bounded_inertial_stress(weight, growing, p)
@@ -178,7 +178,8 @@ def build_slow_manifold_slip_rate_functions(
         """Compute the derivative of ln V along the motion.
 
         The derivative includes the change of ``log_slip_rate_offset``. Without this contribution,
-        the peak slip rate would occur too early, by a slip distance of ``(K/a) w**2`` in D_c.
+        the peak slip rate would occur too early. The error would be a slip distance of
+        ``(K/a) w**2``, in units of D_c.
         """
         spring_stress, psis = state[0], state[1:]
         slope = strength(spring_stress, psis, p)[1]
@@ -261,7 +262,7 @@ def build_rate_function_for_ruptures(friction_functions: FrictionFunctions) -> N
 
     The unknowns are :math:`f`, :math:`x = \ln(V/V_*)`, :math:`g` and all states except the first.
     The independent variable is inertial time in units of :math:`T/(2 \pi)`. Because :math:`g` is an
-    unknown, the function does not need the inverse of ``strength``.
+    unknown, the function does not have to invert ``strength`` to compute :math:`g`.
 
     See ``Dynamics`` for the argument.
 

@@ -28,8 +28,9 @@ from rsfstudy.slider.quantities_required_by_parts import PORE_PRESSURE, SLIP_RAT
 class Fluid(Part):
     r"""Base class of all pore fluids.
 
-    A fluid with unknowns declares them in ``unknowns``. The last unknown of a fluid must be the
-    pore pressure P. A fluid with unknowns also defines two functions as static methods:
+    A fluid with unknowns declares these unknowns in the class attribute ``unknowns``. The last
+    unknown of a fluid must be the pore pressure P. A fluid with unknowns also defines two functions
+    as static methods:
 
     - ``auxiliary_rates(log_slip_rate, states, fraction, p)`` returns the changes of the unknowns
       per unit slip in :math:`D_c`, multiplied by ``fraction``, which is the slip per unit of the
@@ -39,8 +40,8 @@ class Fluid(Part):
 
     The argument ``log_slip_rate`` is :math:`\ln(V/V_*)`, ``states`` is the tuple of the unknowns,
     and ``p`` is the tuple of parameters, in which the parameters of the fluid start at
-    ``p[FLUID]``. When slip stops, the changes per unit slip are infinite, but the
-    changes remain finite if they are multiplied by the argument ``fraction``.
+    ``p[FLUID]``. When slip stops, a change per unit slip becomes infinite, but the product of the
+    change and the argument ``fraction`` remains finite.
 
     The distance between the unknowns and their values in steady sliding determines whether a motion
     has settled and whether a cycle repeats. The attribute ``excluded_from_distance`` lists the
@@ -63,7 +64,7 @@ class Fluid(Part):
 
     @property
     def pressurisation_factor(self) -> float:
-        """Undrained pore pressure in sigma_* for a temperature rise of 1."""
+        """Increase in undrained pore pressure, in sigma_*, for a temperature rise of T_*."""
         return 0.0
 
     def compute_pore_pressure_upper_bound(self, log_slip_rate: float, states: FloatTuple) -> float:

@@ -151,7 +151,7 @@ class DilatantFluid(Fluid):
 
     The pores open when the slip rate increases, which decreases the pore pressure. If the dilatancy
     is negative, the pores close when the slip rate increases, which increases the pore pressure.
-    As in steady sliding, the initial pore pressure equals the pressure of the surroundings.
+    The initial pore pressure equals the pressure of the surroundings, as it does in steady sliding.
 
     Parameters
     ----------

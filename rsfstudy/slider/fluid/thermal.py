@@ -164,7 +164,7 @@ class ThermalFluid(Fluid):
 
     @property
     def pressurisation_factor(self) -> float:
-        """Undrained pore pressure in sigma_* for a temperature rise of 1."""
+        """Increase in undrained pore pressure, in sigma_*, for a temperature rise of T_*."""
         return self.pressurisation
 
     @property
@@ -176,7 +176,7 @@ class ThermalFluid(Fluid):
         """Return the same parameters as for a dilatant fluid.
 
         See ``Part.parameter_values``. The pressurisation factor is stored with the parameters of
-        the part ``temperature``.
+        the temperature part of the scene.
         """
         return DilatantFluid.parameter_values(self, scene)  # type: ignore[arg-type]
 

@@ -113,9 +113,9 @@ class LawBase(Part):
     shift, fraction, p)``. The function ``evolutions`` returns a tuple with the change of each state
     per unit slip, multiplied by ``fraction``. The argument ``fraction`` is the slip per unit of the
     independent variable of the integration. The functions ``evolutions`` and ``steady_states``
-    divide the decrease ``shift`` among the states. The sum of the decreases of all states must
-    equal the argument ``shift``. The field or property ``b_over_a`` is the total evolution effect
-    of all states, divided by the direct effect a. See the module ``two_slip_states`` for an
+    must distribute the stress-induced decrease ``shift`` among the states. The sum of the decreases
+    of all states must equal ``shift``. The field or property ``b_over_a`` is the total evolution
+    effect of all states, divided by the direct effect a. See the module ``two_slip_states`` for an
     example.
 
     Any unknown that affects friction, such as temperature, can be modelled as a state. The value of
@@ -268,8 +268,8 @@ class LawBase(Part):
         r"""Check that the scene supports the stress effect and reversed slip.
 
         The effect of shear stress can be computed only if the integral of :math:`d\tau/\sigma` is
-        known, so normal stress must be proportional to shear stress or constant. Reversed slip
-        requires dynamics that allow a negative slip rate.
+        known. Normal stress must therefore be constant or a linear function of shear stress.
+        Reversed slip requires dynamics that allow a negative slip rate.
 
         Parameters
         ----------
@@ -342,13 +342,13 @@ class Law(LawBase):
         parameter_values(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
 
-    Override ``parameter_values`` if ``evolution`` uses values that are derived from the fields,
-    such as logarithms of the fields. The overriding method must return
-    ``(*super().parameter_values(scene), ...)``. Override ``check`` to raise ``InvalidValue`` if
-    field values contradict each other. The class attribute ``name`` is the name of the law. The
-    attributes ``relaxation``, ``steady_states`` and ``state_effect`` are also optional. A law with
-    one parameter b can have several states. To define several states, write ``evolutions`` and
-    ``steady_states``, as described for ``LawBase``.
+    Override the ``parameter_values`` method if the ``evolution`` function uses values that are
+    derived from the fields, such as logarithms of the fields. The overriding method must return
+    ``(*super().parameter_values(scene), ...)``. Override the ``check`` method to raise
+    ``InvalidValue`` if field values contradict each other. The ``name`` class attribute contains
+    the name of the law. The attributes ``relaxation``, ``steady_states`` and ``state_effect`` are
+    also optional. A law with one parameter b can have several states. To define such a law,
+    implement the functions ``evolutions`` and ``steady_states`` as described for ``LawBase``.
 
     Parameters
     ----------
