@@ -16,7 +16,7 @@ _LONG_DECIMAL_NUMBER_PATTERN = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?"
 
 
 def read_flag_meanings(variable_attributes: Mapping[str, Any]) -> dict[float, str]:
-    """Read the meaning of each flag value from CF attributes.
+    """Read the mapping from flag values to their meanings from CF attributes.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def read_flag_meanings(variable_attributes: Mapping[str, Any]) -> dict[float, st
 
 
 def is_sequence_of_axis_values(value: Any) -> bool:
-    """Return True if a value is a list that can define an axis.
+    """Return True if a value is a sequence that can define the points of an axis.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def format_count_with_noun(count: int, noun: str) -> str:
 
 
 def format_number_or_text(value: Any) -> str:
-    """Format a value, with at most six significant digits for floats.
+    """Format a value as text, and round floats to six significant digits.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def format_number_or_text(value: Any) -> str:
 
 
 def format_fields_except_none(fields: Mapping[str, Any]) -> str:
-    """Format the fields that are not None.
+    """Format the names and values of fields, and omit fields whose value is None.
 
     Parameters
     ----------

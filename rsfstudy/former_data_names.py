@@ -83,7 +83,7 @@ def rename_former_declaration_fields(declaration: Any) -> Any:
 
 
 def _find_new_names_of_sobol_ci_variables(reductions: Any) -> dict[str, str]:
-    """Return the new names of the confidence intervals of Sobol indices."""
+    """Return a mapping from former to new names of the confidence limits of Sobol indices."""
     names = [
         reduction.get("name")
         for reduction in (reductions if isinstance(reductions, list) else [])
@@ -100,7 +100,7 @@ def _find_new_names_of_sobol_ci_variables(reductions: Any) -> dict[str, str]:
 def _rename_claim_fields(
     claim: Mapping[str, Any], new_output_names: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Replace the former names of the fields of a claim."""
+    """Replace former field names in the stored declaration of a claim."""
     current = {
         _NEW_CLAIM_FIELD_BY_FORMER_FIELD.get(key, key): value for key, value in claim.items()
     }
@@ -110,7 +110,7 @@ def _rename_claim_fields(
 def _rename_reduction_fields(
     reduction: Mapping[str, Any], new_output_names: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Replace the former names of the kind and the fields of a reduction."""
+    """Replace the former kind and former field names in the declaration of a reduction."""
     kind = reduction.get("kind")
     if not isinstance(kind, str):
         return dict(reduction)
@@ -190,7 +190,7 @@ class TableAcceptingFormerColumnNames(pd.DataFrame):
 
     @property
     def _constructor(self) -> type[pd.DataFrame]:
-        """Class of the data frames that selections from the table return."""
+        """Class of the data frames that result from selections of columns or rows."""
         return pd.DataFrame
 
     def _find_current_column_name(self, key: Any) -> Any:

@@ -1,9 +1,10 @@
 r"""Statistics of the events of motions that do not repeat.
 
 If a slider has noise, or if its motion is chaotic, the recurrence intervals vary from event to
-event. The measure ``EventStatistics`` computes moments of their distribution. The measure reports
-three errors separately: the integration error for the given noise path, the error due to the
-sampling interval of the noise, and the standard error due to the finite number of events.
+event. The measure ``EventStatistics`` computes moments of the distributions of recurrence intervals
+and stress drops. The measure reports three errors separately: the integration error for the given
+noise path, the error due to the sampling interval of the noise, and the standard error due to the
+finite number of events.
 
 With white noise, :math:`\ln V` fluctuates as rapidly as the noise, so the slip rate crosses each
 level many times. Event detection in scenes with noise therefore uses two levels. An event begins
@@ -64,7 +65,7 @@ def _iterate_moment_outputs() -> Iterator[Output]:
 
 
 class _SlipEvent(NamedTuple):
-    """Event of a motion: time of its beginning in D_c/V_*, and static stress drop in sigma_*."""
+    """Start time of an event in D_c/V_*, and static stress drop of the event in sigma_*."""
 
     start_time: float
     static_stress_drop: float
@@ -78,9 +79,9 @@ class EventStatistics(Measure):
     Use this measure for scenes with noise, and for scenes without noise whose motion may be
     chaotic. If a scene has noise, the recurrence interval is the time between the beginnings of
     successive events. The static stress drop is the difference between two spring stresses. The
-    first is the spring stress when the slip rate last rises above the load point velocity before
-    the event, and the second is the spring stress at the end of the event. If a scene has no noise,
-    both quantities are defined as in ``LimitCycle``, but are computed for each cycle.
+    first stress is the spring stress when the slip rate last rises above the load point velocity
+    before the event. The second stress is the spring stress at the end of the event. If a scene has
+    no noise, both quantities are defined as in ``LimitCycle``, but are computed for each cycle.
 
     If the motion settles to steady sliding, the status is ``no_limit_cycle``. If a scene with noise
     has too few events, the status is ``work_budget_spent``.
@@ -278,7 +279,7 @@ class EventStatistics(Measure):
 def _iterate_events_of_noiseless_motion(
     scene: Scene, integrator: Integrator
 ) -> Iterator[_SlipEvent]:
-    """Yield the cycles of a scene without noise as events."""
+    """Yield one event for each cycle of a scene without noise."""
     time = 0.0
     for cycle in iterate_stick_slip_cycles(scene, integrator, None):
         if cycle is None:
@@ -288,7 +289,7 @@ def _iterate_events_of_noiseless_motion(
 
 
 def _list_recurrence_intervals_and_drops(events: list[_SlipEvent]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the recurrence intervals, and the stress drop that ends each interval."""
+    """Return the recurrence intervals, and the stress drops of the events that end them."""
     intervals = [after.start_time - before.start_time for before, after in pairwise(events)]
     return np.array(intervals), np.array([event.static_stress_drop for event in events[1:]])
 

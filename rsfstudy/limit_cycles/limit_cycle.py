@@ -8,11 +8,12 @@ The limit cycle is the fixed point of the return map.
 The motion is first integrated with a low accuracy until it approaches the limit cycle. The orbit is
 then refined until all unknowns have the same values at both ends of the orbit. The refinement is
 done twice, first with the requested accuracy and then with smaller tolerances. The first cycle
-after the step is never accepted as the limit cycle.
+after the loading step is never accepted as the limit cycle.
 
 If the law or the fluid has several states, the motion may repeat only after 2, 4 or more cycles, or
-never. If the motion repeats after several cycles or never, the results describe the cycle with the
-highest slip rate, and the recorded orbit covers the whole period.
+never. If the motion repeats after several cycles, the results describe the cycle with the highest
+slip rate, and the recorded orbit covers the whole period. If the motion never repeats, there are no
+results.
 """
 
 from __future__ import annotations
@@ -129,9 +130,10 @@ class LimitCycle(RecordingMeasure):
     r"""Limit cycle of stick-slip under a constant load point velocity.
 
     The results include the recurrence interval, the stress drops and the extremes of slip rate. If
-    a motion with several states repeats only after ``period_events`` events, the results describe
-    the event with the highest slip rate. If the motion never repeats, the status is
-    ``not_periodic``, and the message reports the range of the events.
+    a motion with several states repeats only after several events (output ``period_events``), the
+    results describe the event with the highest slip rate. If the motion never repeats, the status
+    is ``not_periodic``, and the message reports the ranges of the peak slip rates and the
+    recurrence intervals.
 
     The output ``slip_mode`` is ``stick_slip`` if the peak slip rate of the cycle reaches a limit
     that depends on the scene (see Notes), and ``slow_slip`` if the peak slip rate is lower. If a
@@ -141,9 +143,10 @@ class LimitCycle(RecordingMeasure):
     The status is ``no_limit_cycle`` only if small perturbations of steady sliding decay. If a
     motion approaches steady sliding and the largest growth rate of small perturbations is zero
     within its error, the status is ``unverified``. The status is also ``unverified`` if an error
-    estimate is more than a hundred times the requested error. If a motion still oscillates after
-    ``events`` events and no event repeats, the status is ``work_budget_spent``. At the critical
-    stiffness, oscillations neither grow nor decay, so both statuses are possible.
+    estimate is more than a hundred times the requested error. If a motion has not repeated after
+    the maximum number of events (``events``) but may still approach a periodic orbit, the status is
+    ``work_budget_spent``. At the critical stiffness, oscillations neither grow nor decay, so the
+    status may be either ``unverified`` or ``work_budget_spent``.
 
     Parameters
     ----------
@@ -323,7 +326,7 @@ class LimitCycle(RecordingMeasure):
 
 
 def _describe_several_events_per_period(orbit: PeriodicOrbit) -> str:
-    """Return a message if a motion repeats only after several events."""
+    """Return a message for an orbit of several events, and otherwise an empty string."""
     if orbit.period_in_cycles == 1:
         return ""
     period = math.fsum(cycle.recurrence_interval for cycle in orbit.cycles)
@@ -442,10 +445,10 @@ def determine_status_from_output_errors(
 
 
 def _compute_primary_output_error_scales(orbit: PeriodicOrbit) -> list[float]:
-    """Return the scales of the errors of the main results.
+    """Return the error scale of each main result.
 
-    The logarithm of V/V_* may be zero, so its scale is at least half of the range of the
-    logarithms.
+    The logarithm of a slip rate may be zero. The error scale of the logarithm is therefore at least
+    half of the difference between the largest and the smallest logarithm.
     """
     *others, slowest, fastest = orbit.corrected_primary_outputs.tolist()
     half = 0.5 * (fastest - slowest)
@@ -457,8 +460,8 @@ def estimate_primary_output_errors(
 ) -> np.ndarray:
     """Estimate the errors of the main results.
 
-    The estimate includes the difference between two runs, and the corrections for the closure
-    error, which both runs share.
+    Each estimate is the sum of two terms. The first term is based on the difference between two
+    runs. The second term is the correction for the closure error, which occurs in both runs.
 
     Parameters
     ----------

@@ -172,7 +172,7 @@ class LimitCycleSearch:
 
     @property
     def _nearly_critical_stiffness_message(self) -> str:
-        """Explanation for the message if the stiffness is nearly critical.
+        """Explanation that is added to the message if the stiffness is nearly critical.
 
         The explanation is an empty string if the stiffness is not close to critical.
         """
@@ -187,7 +187,7 @@ class LimitCycleSearch:
 
     @property
     def last_cycle_as_periodic_orbit(self) -> PeriodicOrbit:
-        """Last cycle as a periodic orbit, with the remaining correction to the limit cycle."""
+        """Periodic orbit that consists of the last cycle, with its offset from the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return PeriodicOrbit(
             tuple(last),
@@ -244,10 +244,11 @@ class LimitCycleSearch:
         return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
 
     def _has_converged(self) -> bool:
-        """Return True if all further cycles would be equal to the last cycle.
+        """Return True if the last cycle is close enough to the limit cycle.
 
         The cycles have converged if the derivatives of the return map predict a sufficiently small
-        change of the next cycle, or if the last two cycles agree.
+        difference between the results of the last cycle and of the limit cycle, or if the last two
+        cycles agree.
         """
         tolerance = self._integrator.result_tolerance(0.3)
         allowed = [tolerance * abs(number) for number in self._image[2:]]
@@ -269,10 +270,11 @@ class LimitCycleSearch:
         return _are_within_tolerance([change * left for change in self._image_change[2:]], allowed)
 
     def _last_cycles_alternate(self) -> bool:
-        """Return True if the last two cycles alternate around the limit cycle.
+        """Return True if the last two cycles are on opposite sides of the limit cycle.
 
-        An alternation around the limit cycle is caused by numerical errors. Trajectories in a plane
-        cannot cross, so exact cycles approach the limit cycle from one side.
+        Trajectories in a plane cannot cross, so exact cycles approach the limit cycle from one
+        side. If the computed cycles alternate around the limit cycle, numerical errors are the
+        cause.
         """
         before, last = (
             cycle.motion_point_at_end.spring_stress - cycle.motion_point_at_start.spring_stress
@@ -286,12 +288,12 @@ class LimitCycleSearch:
         return before * last <= 0.0 and abs(last) <= near
 
     def _should_extrapolate_to_fixed_point(self) -> bool:
-        """Return True if the search should leap to the extrapolated fixed point.
+        """Return True if the search should continue from the extrapolated fixed point.
 
-        If the next cycle would come equally close to the fixed point without extrapolation, the
-        search does not extrapolate. The search also avoids long leaps, because the motion may
-        settle to steady sliding after a long leap. If a leap does not halve the change in spring
-        stress per cycle, no further leap follows, because repeated leaps may form a loop.
+        The search does not extrapolate if the cycles already converge quickly. The search also
+        avoids large extrapolations, because the motion may settle to steady sliding afterwards. The
+        search extrapolates again only if the change in spring stress per cycle has halved since the
+        last extrapolation. Otherwise, repeated extrapolations may form a loop.
         """
         cycle = self.cycles[-1]
         left = abs(
@@ -405,7 +407,7 @@ def _may_still_converge(cycles: Sequence[StickSlipCycle]) -> bool:
 
 
 def _list_state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
-    """Return the sets of states for the detection of a period.
+    """Return the sets of state indices that are compared to detect a period.
 
     The first set contains the states used for the distance from steady sliding. The second set
     contains only the states of the friction law, because a slow unknown of the fluid may converge

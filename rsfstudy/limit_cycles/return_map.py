@@ -1,7 +1,7 @@
 r"""Periodic orbits, computed as fixed points of a return map.
 
 The main methods are ``ReturnMap.find_periodic_orbit``, which searches for an orbit, and
-``ReturnMap.refine_periodic_orbit``, which computes a known orbit with another accuracy.
+``ReturnMap.refine_periodic_orbit``, which recomputes a known orbit with a different accuracy.
 
 A cycle extends from one rise of V through V_0 to the next rise. At a rise, the slip rate is known,
 so the motion is determined by spring stress and the states. If the slider has inertia, the spring
@@ -16,8 +16,8 @@ of cycles branches off (period doubling).
 
 If the effect of inertia is small, a perturbation in the direction of the motion only shifts the
 motion in time. The number of independent perturbations is therefore one less than the number of
-unknowns of a section. A perturbation along the motion changes the states at constant spring stress,
-because spring stress has a maximum at a section.
+components of a section. At a section, spring stress has a maximum, so its time derivative is zero.
+A perturbation along the motion therefore changes the states but not the spring stress.
 
 Notes
 -----
@@ -175,7 +175,7 @@ def extract_section_coordinates(motion_point: MotionPoint) -> np.ndarray:
 
 
 def extract_section_and_outputs_at_cycle_end(cycle: StickSlipCycle) -> np.ndarray:
-    """Return the section at the end of a cycle, and the main results of the cycle.
+    """Return an array of the section at the end of a cycle and the results of the cycle.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ class ReturnMap:
         self._compared_unknowns = [0, *(1 + place for place in places)]
 
     def section_coordinates_to_point(self, section_coordinates: np.ndarray) -> MotionPoint:
-        """Return the point of the motion at a section.
+        """Convert a section vector to a point of the motion.
 
         The point is on the slow manifold, unless inertia is important. If inertia is important, the
         slip rate of the point is V_0.
@@ -288,7 +288,7 @@ class ReturnMap:
         )
 
     def _inertia_matters_at(self, motion_point: MotionPoint) -> bool:
-        """Return True if inertia is too important for the slow manifold."""
+        """Return True if the slow-manifold approximation of inertia is not accurate enough."""
         return self.integrator.inertia_matters_at(self.scene, motion_point)
 
     def follow_cycles(
@@ -332,7 +332,7 @@ class ReturnMap:
         return seen
 
     def follow_one_cycle_to_next_section(self, start_section: np.ndarray) -> np.ndarray | None:
-        """Compute the section one cycle later, and the main results.
+        """Compute one cycle, and return the next section and the main results.
 
         Parameters
         ----------
@@ -350,7 +350,7 @@ class ReturnMap:
     def compute_return_map_derivatives_per_cycle(
         self, start_section: np.ndarray, cycle_count: int, state_scale: float
     ) -> tuple[np.ndarray, ...]:
-        """Compute the Jacobian of the return map of each cycle by finite differences.
+        """For each cycle, compute the Jacobian of the return map by finite differences.
 
         Parameters
         ----------
@@ -392,11 +392,11 @@ class ReturnMap:
     def compute_motion_direction_and_image_change(
         self, motion_point: MotionPoint
     ) -> tuple[FloatTuple, FloatTuple]:
-        """Compute the direction of the motion at a section, and its effect on the image.
+        """Compute the direction of the motion at a section, and the resulting image change.
 
-        The effect on the image is the change in the image that results from a displacement of the
-        section along the motion. If the effect of inertia is small, a displacement along the motion
-        changes only the duration of the cycle.
+        The image change is the change in the next section and in the main results if the section is
+        displaced along the motion. If the effect of inertia is small, a displacement along the
+        motion changes only the duration of the cycle.
 
         Parameters
         ----------

@@ -103,9 +103,9 @@ class StickSlipCycle(NamedTuple):
         """Return the main results of the cycle.
 
         Stress drops are measured from the spring stress at the beginning of the cycle, because the
-        next cycle may begin at a different stress. The static stress drop extends to the lowest
-        spring stress, and the dynamic stress drop extends to the spring stress at the peak slip
-        rate.
+        next cycle may begin at a different stress. The static stress drop is the decrease to the
+        lowest spring stress, and the dynamic stress drop is the decrease to the spring stress at
+        the peak slip rate.
 
         Returns
         -------
@@ -184,7 +184,7 @@ def iterate_stick_slip_cycles(
 
 
 def suggest_raising_event_limit(event_limit: int, option_name: str = "events") -> str:
-    """Return the part of a message that advises the user to allow more events.
+    """Return a sentence for error messages that advises the user to raise the event limit.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def extract_recorded_rows_of_cycles(
 
 @lru_cache(maxsize=256)
 def _build_cycle_event_specifications(log_load_velocity: float) -> tuple[EventSpecification, ...]:
-    """Return the events that delimit the cycles at ln(V_0/V_*)."""
+    """Return specifications of the events from which cycles are assembled."""
     return (
         maximum("log_slip_rate", may_report_later=True),
         minimum("log_slip_rate", may_report_later=True),
@@ -252,7 +252,7 @@ def _build_cycle_event_specifications(log_load_velocity: float) -> tuple[EventSp
 
 
 def _are_log_rate_ranges_approaching_zero(log_slip_rate_ranges: list[float]) -> bool:
-    """Return True if the decreasing ranges of ln V approach zero.
+    """Return True if the range of ln V decreases from cycle to cycle and approaches zero.
 
     The ranges of ln V in the last three cycles decrease by d_1 and then by d_2. These decreases are
     extrapolated as a geometric series, which gives a further decrease of d_2**2/(d_1 - d_2). Near
@@ -292,7 +292,7 @@ def _build_cycle_from_events(
 
 
 def _find_slip_arrest_point(events: Sequence[Event]) -> MotionPoint | None:
-    """Return the point at which friction balances the spring after rupture.
+    """Return the first point after the rupture at which friction balances the spring.
 
     The result is None if the cycle has no such point.
     """

@@ -27,7 +27,7 @@ VARIABLES_RECORDED_ALONG_PHASE = (
 
 
 def create_outputs_along_phase(*names: str) -> tuple[Output, ...]:
-    """Return outputs along the dimension ``phase``.
+    """Create outputs that have the dimension ``phase``.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def create_outputs_along_phase(*names: str) -> tuple[Output, ...]:
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class RecordingMeasure(Measure):
-    """Base class of measures whose results include a record along ``phase``.
+    """Base class of measures whose results include a motion along the dimension ``phase``.
 
     A subclass defines the field ``phases``, which sets the number of points of the record.
     """
@@ -57,7 +57,7 @@ class RecordingMeasure(Measure):
 
     @property
     def recorded_point_count(self) -> int:
-        """Number of record points that are stored."""
+        """Number of points of the stored record."""
         return int(self.scalar_field_values["phases"])
 
     @cached_attribute

@@ -76,7 +76,7 @@ _TYPICAL_PARAMETER_COUNT = 8
 class _LogValueWithError(NamedTuple):
     """Value and error of ``ln|y|``.
 
-    The error is the error of y divided by ``|y|``.
+    The error of ``ln|y|`` is the error of y divided by ``|y|``.
     """
 
     log_value: float
@@ -212,7 +212,7 @@ class Elasticities(Measure):
 
     @property
     def output_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Parameter names, which are the coordinate values of ``parameter``."""
+        """Names of the parameters, as coordinate values of the dimension ``parameter``."""
         return {"parameter": np.array(self.parameters, dtype=object)}
 
     @property
@@ -229,7 +229,7 @@ class Elasticities(Measure):
 
     @property
     def relative_cost_by_digits(self) -> Mapping[float, float]:
-        """Relative cost of the inner measure for each requested number of digits."""
+        """Mapping from the requested number of digits to the relative cost."""
         return self.measure.relative_cost_by_digits
 
     def describe(self) -> dict[str, Any]:
@@ -355,7 +355,7 @@ class Elasticities(Measure):
         log_change: float,
         integrator: Integrator,
     ) -> _LogValueWithError | None:
-        """Compute ``ln|y|`` after the logarithm of a parameter has been changed.
+        """Change the logarithm of a parameter, and compute ``ln|y|`` for the changed scene.
 
         Parameters
         ----------
@@ -391,7 +391,7 @@ class Elasticities(Measure):
         return self._compute_log_of_primary_output(outcome)
 
     def _compute_log_of_primary_output(self, outcome: Outcome) -> _LogValueWithError | None:
-        """Return ``ln|y|`` of an outcome, and its error including the rounding error.
+        """Return ``ln|y|`` for an outcome, with an error that includes rounding errors.
 
         Returns
         -------

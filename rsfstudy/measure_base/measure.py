@@ -156,7 +156,7 @@ class Measure(ConstructorKeywordCheckMixin):
     fields_stored_unless_default: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
-        """Adopt former names of members that the subclass defines."""
+        """Add the new names of members that the subclass defines under former names."""
         super().__init_subclass__()
         copy_former_overrides_to_new_names(cls)
         accept_deprecated_accuracy_and_meter(cls)
@@ -173,7 +173,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @cached_attribute
     def variables(self) -> Mapping[str, tuple[str, ...]]:
-        """Inner dimensions of each result and error estimate, by name.
+        """Inner dimensions, keyed by the name of the result or error estimate.
 
         For a scalar result, the tuple of dimensions is empty.
         """
@@ -195,7 +195,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @property
     def output_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Coordinate values of the inner dimensions, by dimension."""
+        """Mapping from inner dimensions to their coordinate values."""
         return {}
 
     @property
@@ -236,9 +236,9 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @property
     def relative_cost_by_digits(self) -> Mapping[float, float]:
-        """Relative cost of the computation, by requested number of digits.
+        """Mapping from the requested number of digits to the relative computational cost.
 
-        The number of digits is ``-log10(rtol)``, and the work is relative to the work at the
+        The number of digits is ``-log10(rtol)``, and the cost is relative to the cost at the
         default accuracy. The default values were measured for limit cycles, the most demanding
         measure, in the study ``accuracy_cost``.
         """
@@ -263,7 +263,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @property
     def scalar_field_values(self) -> dict[str, PlainValue]:
-        """Fields that hold a number, a flag or a string, by name.
+        """Mapping from field names to values, for fields with a number, flag or string.
 
         Only these fields may vary along an axis.
         """
@@ -272,7 +272,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @property
     def fields_omitted_from_storage(self) -> frozenset[str]:
-        """Names of the fields that descriptions and cell keys omit."""
+        """Names of the fields that are omitted from descriptions and cell keys."""
         defaults = {
             name: type(self).__dataclass_fields__[name].default
             for name in self.fields_stored_unless_default
@@ -280,7 +280,7 @@ class Measure(ConstructorKeywordCheckMixin):
         return frozenset(n for n, default in defaults.items() if getattr(self, n) == default)
 
     def with_(self, **changes: Any) -> Measure:
-        """Return a copy of the measure with other values of plain fields.
+        """Return a copy of the measure with new values of number, flag or string fields.
 
         Parameters
         ----------
@@ -317,13 +317,13 @@ class Measure(ConstructorKeywordCheckMixin):
             raise InvalidValue("fields", changes, rule) from error
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Return the scale of the numerical error of each result.
+        """Return a mapping from results to the scales of their numerical errors.
 
         The requested error of each result is the relative accuracy multiplied by the scale of the
         result. If the error estimate of a result is more than a hundred times the requested error,
         the status of the cell becomes ``unverified``. Results without a scale are not checked. A
-        method that overrides this one should omit statistical results, and results whose resolution
-        is set by an option of the measure.
+        method that overrides this method should omit statistical results, and results whose
+        resolution is set by an option of the measure.
 
         Parameters
         ----------
@@ -398,7 +398,7 @@ class Measure(ConstructorKeywordCheckMixin):
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Compute the results for one scene.
 
-        If a motion cannot continue, the status of the outcome states why.
+        If a motion cannot continue, the status of the outcome shows the reason.
 
         Parameters
         ----------
@@ -442,7 +442,7 @@ class Measure(ConstructorKeywordCheckMixin):
         return outcome
 
     def run_metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, WorkMeter]:
-        """Compute the results for one scene, and return the work meter.
+        """Compute the results for one scene, and return the outcome and the work meter.
 
         Parameters
         ----------
@@ -556,7 +556,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Return the fields that a measure description omits or does not store as plain data.
+        """Return values of fields that a description omits or does not store as plain data.
 
         Parameters
         ----------
@@ -639,7 +639,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
 def compute_relative_cost_at_accuracy(
     accuracy: Accuracy, relative_cost_by_digits: Mapping[float, float]
 ) -> float:
-    """Return the cost at a requested accuracy, relative to the default accuracy.
+    """Return the relative cost of the computation at a requested accuracy.
 
     The function interpolates costs that were measured for several numbers of digits.
 

@@ -1,4 +1,4 @@
-"""Chains of loading segments, and the events at the start of each chain."""
+"""Chains of loading segments between stress jumps, and events at the start of a chain."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rsfstudy.slider import SINGLE_ENDLESS_SEGMENT_TABLE, FloatTuple, MotionPoin
 def split_segments_at_stress_jumps(
     scene: Scene, *, only_last_segment: bool
 ) -> Sequence[tuple[Scene, np.ndarray]]:
-    """Split the loading segments of a scene into chains.
+    """Split the loading segments of a scene at jumps in stress.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def split_segments_at_stress_jumps(
 def find_remaining_loading_segments(
     scene: Scene, last_event: Event
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
-    """Return the segment chains that remain when a motion is resumed.
+    """Return the chains of loading segments that remain when a motion is resumed.
 
     If the motion ended at a jump in stress, the resumed motion starts after this jump.
 
@@ -81,7 +81,7 @@ def find_remaining_loading_segments(
 
 
 def truncate_loading_segments_at_time(segment_table: np.ndarray, end_time: float) -> np.ndarray:
-    """Return the loading segments of a chain up to an end time.
+    """Truncate a table of loading segments at an end time.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def truncate_loading_segments_at_time(segment_table: np.ndarray, end_time: float
 def prepare_noisy_loading_segment(
     scene: Scene, start_point: MotionPoint, segment_table: np.ndarray
 ) -> tuple[MotionPoint, FloatTuple, np.ndarray, Iterator[np.ndarray]]:
-    """Return the initial values and the segment tables of a segment with noise.
+    """Compute the initial values and the segment tables of a loading segment with noise.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def iterate_segment_start_events(
     segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
-    """Yield the events at the stress jump that begins a segment chain.
+    """Yield the events at the stress jump before a chain of loading segments.
 
     The first chain of a motion does not start with a jump in stress, so the function is not called
     for the first chain. The first event is the start of the loading segment. The other events are
@@ -189,12 +189,13 @@ def select_event_specs_that_can_occur(
     *,
     includes_last_segment: bool,
 ) -> Sequence[EventSpecification]:
-    """Select the requested events that can occur in a segment chain.
+    """Select the requested events that can occur in a chain of loading segments.
 
-    Only in the last chain can the motion settle. Settling events are omitted if the load point
-    oscillates. If steady sliding is unstable, terminal settling events are also omitted, because
-    these events would end the motion. See ``remove_settling_events_if_unstable`` for other settling
-    events.
+    The motion can settle only in the last chain. Settling events are omitted if the load point
+    oscillates or if the loading has noise. If steady sliding is unstable and a settling event is
+    terminal, all settling events are also omitted, because the terminal event would end the motion.
+    If no settling event is terminal, ``remove_settling_events_if_unstable`` removes the events when
+    they occur.
 
     Parameters
     ----------
@@ -225,7 +226,7 @@ def select_event_specs_that_can_occur(
 def remove_settling_events_if_unstable(
     scene: Scene, motion_events: Iterator[Event]
 ) -> Iterator[Event]:
-    """Yield the events of a motion, except settling at unstable steady sliding.
+    """Yield the events of a motion, but omit settling events if steady sliding is unstable.
 
     The stability is computed only if the motion has a settling event. Most motions do not have
     settling events.

@@ -30,7 +30,7 @@ _REMEDY_FOR_FORMER_ARGUMENTS = (
 
 
 def accept_deprecated_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
-    """Let a function with an ``integrator`` accept the deprecated arguments.
+    """Make a function with the argument ``integrator`` accept the deprecated arguments.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ def create_stepper(
 
 @cache
 def _import_stepper_classes_by_engine() -> dict[str, Any]:
-    """Return the stepper classes of the SciPy and Python engines."""
+    """Return a mapping from the names of the SciPy and Python engines to stepper classes."""
     order_eight = importlib.import_module("rsfstudy.motion.steppers.order_eight")
     scipy = importlib.import_module("rsfstudy.motion.steppers.scipy")
     return {PYTHON: order_eight.OrderEightStepper, SCIPY: scipy.SciPyStepper}

@@ -22,7 +22,7 @@ from rsfstudy.slider import EquationsOfMotion, FloatTuple, NumericFunction
 class InPlaceFunctions(NamedTuple):
     """Functions of a system of equations, ordered as in the function table.
 
-    Each function has the arguments ``(y, rates, p, result)``, and fills the array ``result``. The
+    Each function has the arguments ``(y, rates, p, result)``, and fills the ``result`` array. The
     only exception is ``attempt_step``, whose arguments are ``(y, stages, p, step)``.
 
     Parameters

@@ -25,9 +25,9 @@ def compute_initial_point(scene: Scene) -> MotionPoint:
     """Return the initial point of a motion, immediately after the loading step.
 
     Before the loading step, the slider slides steadily at V_*, or has the initial stress and state
-    of the scene. The loading step changes the spring stress and the imposed normal stress. If the
-    scene has inertia, the loading step does not change the slip rate immediately. Instead, the slip
-    rate adjusts to the loading step within the inertial time.
+    that the scene specifies. The loading step changes the spring stress and the imposed normal
+    stress. If the scene has inertia, the loading step does not change the slip rate immediately.
+    Instead, the slip rate adjusts to the loading step within the inertial time.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def build_point_without_derived_values(
     log_slip_rate: float = math.nan,
     frictional_stress: float = math.nan,
 ) -> MotionPoint:
-    r"""Return a point with the initial values of a motion and no derived values.
+    r"""Return a point that contains only the initial values of a motion.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def _reset_loading_unknowns(scene: Scene, states: FloatTuple) -> FloatTuple:
 def _find_specified_initial_states(
     scene: Scene, steady_states: FloatTuple
 ) -> tuple[FloatTuple, float]:
-    """Find the states and ln(V/V_*) for the initial stress and state of the scene.
+    """Find the states and ln(V/V_*) that the initial stress and state of the scene imply.
 
     The function solves for the value of Psi that gives the specified state variable.
     """

@@ -1,8 +1,8 @@
 """Events of a motion: kinds of events, and specifications of requested events.
 
 The module ``integration_step_events`` detects and locates the events. The event table lists the
-events in chronological order. For each event, it contains the slip and the point of the motion
-(slip rate, stresses and states). A measure can request the following events:
+events in chronological order. For each event, the table contains the slip and the point of the
+motion (slip rate, stresses and states). A measure can request the following events:
 
     maximum(quantity), minimum(quantity)
                                 extremum of a quantity
@@ -213,10 +213,11 @@ def _specify_quantity_event(
 def approach_to_steady_state(fraction: float, *, terminal: bool = False) -> EventSpecification:
     """Create an event specification for the approach to steady sliding.
 
-    The event occurs when the distance between the motion and steady sliding falls below a fraction
-    of its largest value so far. The distance between the motion and steady sliding is measured in
-    ln V and in each state divided by b. The distance does not include unknowns that are listed in
-    the attribute ``excluded_from_distance`` of a scene part.
+    The event occurs when the distance between the motion and steady sliding falls below a given
+    fraction of the largest distance so far. The distance is the larger of two values: the absolute
+    difference in ln V, and the largest absolute difference in a state divided by the parameter b.
+    The distance does not include unknowns that are listed in the attribute
+    ``excluded_from_distance`` of a scene part.
 
     Parameters
     ----------

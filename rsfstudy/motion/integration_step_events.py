@@ -127,9 +127,9 @@ def append_step_end_event(motion, workspace, event_table, event_code):
 def append_regime_or_segment_start_events(motion, workspace, last_point, event_table):
     """Append the events at the start of a regime or segment.
 
-    The first event is the start of the regime or segment. The start of a segment is omitted if the
-    loading excludes it from the reported events. The function also appends requested events that
-    occur at the jump between the previous and the new regime or segment.
+    The first event is the start of the regime or segment. The start event of a segment is omitted
+    if the loading does not report the start of this segment. The function also appends requested
+    events that occur at the jump between the previous and the new regime or segment.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def find_jump_side_of_event(
     point_after: Any,
     parameters_after: Any,
 ) -> int:
-    """Find the side of a jump on which a requested event is reported.
+    """Determine if an event at a jump is reported before or after the jump.
 
     Parameters
     ----------

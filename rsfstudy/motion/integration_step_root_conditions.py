@@ -114,7 +114,7 @@ def may_any_event_be_reported_later(workspace):
 
 
 def compute_excess_over_switch_threshold(motion, workspace, point_columns):
-    """Return the excess of the inertia effect over the slow-manifold limit.
+    """Return the relative excess of the inertia effect over its limit.
 
     A non-negative excess means that the motion must leave the slow manifold. In ruptures, and for
     motions without inertia, the function returns -1.
@@ -145,7 +145,7 @@ def compute_excess_over_switch_threshold(motion, workspace, point_columns):
 
 
 def has_event_occurred(event_spec, quantity_before, quantity_after, integration_direction):
-    """Return True if a quantity changes sign in the direction of an event.
+    """Return True if a quantity changes sign in the direction that defines an event.
 
     Parameters
     ----------
@@ -218,8 +218,8 @@ _find_root_of_condition = build_root_finder(evaluate_root_condition)
 def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspace):
     """Locate the root of a condition within the step.
 
-    The tolerance of the root is 1e-15 of the step size for ``TIME_CONDITION``, and 1e-13 of the
-    step size for all other conditions.
+    The tolerance of the root is 1e-15 times the step size for ``TIME_CONDITION``, and 1e-13 times
+    the step size for all other conditions.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ def should_record_step(motion, workspace, requested_samples):
 
 
 def record_step_samples(motion, workspace, recording_table, requested_samples, is_motion_over):
-    """Record samples of the step, and return True after the last requested sample.
+    """Record samples of the step, and return True if they include the last requested sample.
 
     Parameters
     ----------

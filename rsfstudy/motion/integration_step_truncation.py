@@ -127,8 +127,9 @@ def repeat_step_to_segment_end_time(motion, workspace, independent_variable):
     """Repeat the step so that it ends at the end time of the segment.
 
     If numerical stability limits the step size, the dense output is much less accurate than the
-    solution at the end of the step. The function therefore uses the time between the end of the
-    step and the end of the segment to correct its estimate, and repeats the step.
+    solution at the end of the step. The function therefore repeats the step more than once. After
+    each repetition, the estimate is corrected for the remaining time between the end of the step
+    and the end of the segment.
 
     Parameters
     ----------

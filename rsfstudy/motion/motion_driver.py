@@ -64,7 +64,7 @@ _DEFAULT_LATER_SEGMENTS_AND_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
 class MotionDriver:
-    """Driver that integrates motions with the same equations.
+    """Driver that integrates all motions that have the same equations.
 
     The motions may differ in their initial points and parameters.
 
@@ -309,7 +309,7 @@ def _shift_stresses_of_point(point: MotionPoint, stress_change: float) -> Motion
 def get_motion_driver(
     scene: Scene, engine: str, methods: tuple[tuple[str, str], ...], *, include_time_equation: bool
 ) -> MotionDriver:
-    """Return the driver of the motions of a scene.
+    """Return the driver that integrates the motions of a scene.
 
     Parameters
     ----------

@@ -30,8 +30,9 @@ def resample_motion_along_path(
     """Resample a recorded motion at points along its path.
 
     Half of the points are evenly spaced in path length, which is computed from time, ln V and
-    stress. The other half are distributed in the same way as the integration steps. The integration
-    steps are short where the path bends. The points include all extrema of slip rate and stress.
+    stress. The other points are distributed in the same way as the integration steps. The
+    integration steps are short where the path bends. The points include all extrema of slip rate
+    and stress.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ _SLIP_COLUMN, _SLIP_RATE_COLUMN = (
 def estimate_neglected_inertia_error(
     scene: Scene, recorded_rows: np.ndarray, slow_regime_number: int, initial_log_slip_rate: float
 ) -> np.ndarray:
-    r"""Estimate the error of ln V due to the approximation of inertia.
+    r"""Estimate the error in ln V due to the approximation of inertia.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def estimate_neglected_inertia_error(
 def _compute_log_slip_rate_change_bounds(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> np.ndarray:
-    """Compute an upper bound on the change in ln V due to residuals.
+    """Compute upper bounds on the change in ln V due to force balance residuals.
 
     For each row, the upper bound is the smaller of two values: the integrated residual and the
     largest residual so far.
@@ -134,7 +134,7 @@ def _compute_log_slip_rate_change_bounds(
 def _iterate_equation_of_motion_residuals(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> Iterator[float]:
-    """Yield the residual of the equation of motion at each row, divided by a.
+    """Yield the residual of the equation of motion at each row, divided by parameter a.
 
     The residual is set to zero if the inertia weight is negligible.
     """
@@ -156,7 +156,7 @@ def _iterate_equation_of_motion_residuals(
 def _compute_force_balance_residual(
     segment_scene: Scene, parameters: FloatTuple, recorded_row: np.ndarray, inertia_weight: float
 ) -> float:
-    """Compute the residual of the equation of motion at a row, divided by a.
+    """Compute the residual of the equation of motion at a row, divided by parameter a.
 
     The recorded row must belong to the slow-manifold regime.
     """

@@ -1,8 +1,8 @@
 """Descriptions of overflows in user-defined functions.
 
 The integrators reject a trial step whose rates overflow. The rates may also overflow at the point
-where a step or a motion starts, so that no step is possible. The functions of this module then
-describe the user-defined function and its arguments.
+where a step or a motion starts, so that no step is possible. In this case, the functions of this
+module describe the user-defined function that overflows and its arguments.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FunctionResult = TypeVar("FunctionResult")
 
 
 def call_and_describe_overflow(function: Callable[..., Any], *arguments: Any) -> str:
-    """Call a function, and describe the overflow if the call overflows.
+    """Call a function, and return a description of the overflow if an overflow occurs.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def call_and_describe_overflow(function: Callable[..., Any], *arguments: Any) ->
 def convert_overflow_to_motion_stopped(
     function: Callable[FunctionParameters, FunctionResult],
 ) -> Callable[FunctionParameters, FunctionResult]:
-    """Decorate a function that evaluates the equations at an initial point.
+    """Decorate a function, so that an overflow raises ``MotionStopped``.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def convert_overflow_to_motion_stopped(
 
 
 def _describe_overflow_error(error: OverflowError) -> str:
-    """Describe the part function that overflowed, and list its arguments."""
+    """Describe the function of a scene part that overflowed, and list its arguments."""
     for frame in _iterate_frames(error):
         if owner := _find_part_and_function_of_frame(frame):
             return (

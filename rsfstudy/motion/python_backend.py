@@ -135,7 +135,7 @@ class PythonMotionState(SimpleNamespace):
 
     @property
     def motion_state_array(self) -> list[PythonMotionState]:
-        """Argument ``motion_state_array`` of the event loop."""
+        """Value that the event loop receives as the argument ``motion_state_array``."""
         return [self]
 
     def get_evaluation_and_table_row_counts(self) -> tuple[int, ...]:

@@ -75,7 +75,7 @@ class MotionRecorder:
     _time_capped_block_count: int = 0
 
     def get_or_add_regime_index(self, regime_name: str) -> int:
-        """Return the index of a regime, and add new regimes to the list.
+        """Return the index of a regime, and add the regime to the list if it is new.
 
         Parameters
         ----------
@@ -122,7 +122,7 @@ class MotionRecorder:
         self._row_blocks.append(rows)
 
     def cap_recorded_times_at(self, end_time: float) -> None:
-        """Limit the recorded times of a segment chain to the end time of the chain.
+        """Replace recorded times that exceed the end time of a chain of loading segments.
 
         Parameters
         ----------
@@ -303,7 +303,7 @@ def truncate_recording_at_row(recorded_rows: np.ndarray, last_row: np.ndarray) -
     """Truncate a recorded motion at a row within an integration step.
 
     The samples of the truncated step are replaced by evenly spaced samples up to the last row. The
-    position of the last row within the step is computed from its time.
+    position of the last row within the step is computed from the time of the row.
 
     Parameters
     ----------
@@ -356,9 +356,9 @@ def resample_along_path(  # type: ignore[no-untyped-def]
 ):
     """Resample a recorded motion at points along its path.
 
-    Changes in time, ln V and stress contribute half of the path length. The other half is
-    proportional to the number of rows. The points closest to extrema of slip rate and stress are
-    moved to the extrema.
+    Changes in time, ln V and stress contribute half of the path length. The other half of the path
+    length is proportional to the number of rows. The points closest to extrema of slip rate and
+    stress are moved to the extrema.
 
     Parameters
     ----------
@@ -446,7 +446,7 @@ def find_fractional_row_of_extremum(
 ) -> float:
     """Find the fractional row number of an extremum.
 
-    The function interpolates the samples of a step by a polynomial, and finds the extremum of the
+    The function interpolates the samples of a step with a polynomial, and finds the extremum of the
     polynomial by Newton's method.
 
     Parameters

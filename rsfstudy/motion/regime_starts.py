@@ -139,8 +139,9 @@ def enter_initial_regime(
 def set_initial_unknowns_of_regime(motion, y, last_point):
     """Set the unknowns of a regime from the last point of the previous regime.
 
-    A change of regime does not change spring stress, states and time. If the new regime is the slow
-    manifold, ln V and friction may jump, because they are computed from spring stress and states.
+    A change of regime does not change the spring stress, the states or the time. If the new regime
+    is the slow manifold, ln V and friction may jump, because they are computed from spring stress
+    and states.
 
     Parameters
     ----------

@@ -188,8 +188,8 @@ def compute_slip_during_rate_change(
 ) -> float:
     r"""Compute the slip during a transition between two slip rates.
 
-    Approximating the transition by a jump of the slip rate neglects the evolution of the states
-    over this slip.
+    If the transition is approximated by a jump in slip rate, the evolution of the states during
+    this slip is neglected.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def find_termination_status(
 ) -> int:
     r"""Find the termination status of a motion.
 
-    The shear stress may change its sign when a rupture overshoots. This change of sign does not
+    The shear stress may change sign when a rupture overshoots. This change of sign does not
     terminate the motion, because the equations remain valid.
 
     Parameters
@@ -412,7 +412,7 @@ def find_termination_status(
 def compute_margin_to_motion_termination(
     log_slip_rate: float, normal_stress: float, load_velocity: float
 ) -> float:
-    r"""Compute the margin between a motion and its nearest termination limit.
+    r"""Compute how far a motion is from the nearest limit that terminates it.
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ class WorkMeter:
 
     @property
     def larger_budget_advice(self) -> str:
-        """Final sentence of an error message, which suggests a fourfold budget."""
+        """Final sentence of an error message, which suggests a four times larger budget."""
         return (
             f". To continue, increase the budget to {4 * self.budget}: --budget "
             f"{4 * self.budget} (in Python, budget={4 * self.budget})"
@@ -118,7 +118,7 @@ class WorkMeter:
     def charge_work_since_last_call(
         self, regime_names: Sequence[str], work_before: Sequence[int], work_now: Sequence[int]
     ) -> int:
-        """Add the evaluations and steps of a motion since the previous call.
+        """Count the evaluations and steps of a motion since the previous call.
 
         Parameters
         ----------

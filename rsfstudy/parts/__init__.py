@@ -2,10 +2,10 @@
 
 Derive a state evolution law from ``Law`` or ``LawBase``, a normal stress condition from
 ``NormalStress``, a pore fluid from ``Fluid``, the dynamics from ``Dynamics``, a loading from
-``Loading``, and a temperature from ``Temperature``. Declare the fields of the part with ``number``
-and ``flag``. The functions of parts receive a tuple of parameters ``p``. Constants such as ``LAW``
-are the indices of the parameters in the tuple ``p``. This package only exports names that are
-defined in ``rsfstudy.slider``.
+``Loading``, and a temperature from ``Temperature``. Declare the fields of the part with the
+functions ``number()`` and ``flag()``. The functions of parts receive a tuple of parameters ``p``.
+Constants such as ``LAW`` are the indices of the parameters in the tuple ``p``. This package only
+exports names that are defined in ``rsfstudy.slider``.
 """
 
 from __future__ import annotations

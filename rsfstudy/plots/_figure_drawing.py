@@ -215,7 +215,7 @@ def _add_header_with_notes(figure: Figure, dataset: xr.Dataset) -> None:
 
 
 def _format_note_on_missing_cells(dataset: xr.Dataset) -> tuple[str, bool]:
-    """Return a note about missing and failed cells, and True if it is a warning.
+    """Return a note about missing and failed cells, and a flag that marks it as a warning.
 
     The note is in brackets. If the results are complete, the note is empty.
     """

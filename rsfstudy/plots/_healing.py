@@ -104,7 +104,7 @@ def plot_healing(
 
 
 def _draw_record_with_holds(hold_table: xr.Dataset, record: Record, axes: Axes) -> None:
-    """Draw friction against load point displacement, and mark the measured values."""
+    """Plot friction against load point displacement, and mark the measured values."""
     moved, friction = record.columns["displacement"], record.columns["friction"]
     thinned = slice(None, None, max(1, len(record) // _MAX_DRAWN_ROWS))
     axes.plot(moved[thinned], friction[thinned], ".", color="0.7", markersize=1.5, label="record")
@@ -123,7 +123,7 @@ def _draw_record_with_holds(hold_table: xr.Dataset, record: Record, axes: Axes) 
 
 
 def _draw_healing_against_hold_duration(hold_table: xr.Dataset, axes: Axes) -> None:
-    """Draw healing and relaxation against the hold duration."""
+    """Plot healing and relaxation against the hold duration."""
     duration = hold_table["duration"].values
     for number, (name, label, sign) in enumerate(
         (

@@ -238,7 +238,7 @@ def _draw_slip_rate(displayed_motion: xr.Dataset, axes: Axes, x_variable: str) -
 
 
 def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Axes) -> None:
-    """Draw friction and steady-state friction against slip rate."""
+    """Plot friction and steady-state friction against slip rate."""
     logs = motion["log10_slip_rate"]
     rates = displayed_motion.get("slip_rate", (10.0**logs).assign_attrs(units="$V_*$"))
     scale = float(rates[0]) / 10.0 ** float(logs[0])

@@ -60,7 +60,7 @@ _ARRAY_OF_ONE_MISSING_VALUE = xr.DataArray(np.nan)
 
 
 def split_panel_by_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
-    """Create one panel for each point of the lattice axes in ``facet``.
+    """Create one panel for each combination of points along the ``facet`` axes.
 
     Parameters
     ----------
@@ -268,10 +268,10 @@ def _choose_line_style_for_second_hue(point_number: int) -> dict[str, str]:
 
 
 def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> None:
-    """Add the line styles of the second axis in ``hue`` to the legend.
+    """Add legend entries for the line styles of the second ``hue`` axis.
 
-    The legend entries are grey. No entries are added if only one axis in ``hue`` varies, if the
-    first axis has a colour scale, or if the panel defines its own curve labels.
+    The legend entries are grey. No entries are added if only one ``hue`` axis varies, if the first
+    axis has a colour scale, or if the panel defines its own curve labels.
     """
     if panel.curve_label is None and len([d for d in panel.hue if panel_data.sizes[d] > 1]) > 1:
         second = panel.hue[1]
@@ -289,7 +289,7 @@ def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> 
 
 
 def _compute_curve_colours(panel_data: xr.Dataset, dimension: str) -> np.ndarray | None:
-    """Return the colours of a numeric axis with many points.
+    """Return one colour per point of a numeric axis with many points.
 
     The result is None if the axis has few points or is not numeric.
     """

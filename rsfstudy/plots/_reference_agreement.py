@@ -1,4 +1,4 @@
-"""Figure that compares the results of another code with known answers."""
+"""Figure of the agreement between the results of another code and reference results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SequenceOfXYPairs = Sequence[tuple[float, float]]
 def draw_agreement(
     digits: Mapping[str, SequenceOfXYPairs], label: str, required_digits: float
 ) -> Figure:
-    """Draw the number of correct digits of each quantity.
+    """Plot the number of correct digits of each quantity.
 
     Parameters
     ----------

@@ -100,8 +100,9 @@ def _to_matplotlib_style(user_style: Any) -> str | dict[str, Any]:
     """Convert a style to an argument of ``matplotlib.style.use``.
 
     The result is the name of a style or a dictionary of checked settings. Other styles are
-    rejected. Otherwise, matplotlib would import a package if the style is a dotted name, download a
-    style sheet if it is a URL, or parse any text file and print a warning for each line.
+    rejected. If rsfstudy did not reject such styles, matplotlib would import a package for a dotted
+    name, download a style sheet from a URL, or parse any text file and print a warning for each
+    line.
     """
     if isinstance(user_style, Mapping):
         return _validate_matplotlib_settings(user_style)
@@ -370,7 +371,7 @@ def _create_legend_that_fits_width(
     """Create a legend with as many columns as fit into a given width.
 
     The width is in pixels. Matplotlib fills the columns of a legend one after another, so the
-    function reorders the entries to be read line by line.
+    function reorders the entries so that they can be read row by row.
     """
     for beside in range(min(max_columns, len(handles_by_label)), 0, -1):
         texts = [

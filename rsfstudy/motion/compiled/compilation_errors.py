@@ -95,7 +95,7 @@ def build_compilation_error(numba_error: Exception) -> InvalidValue:
 
 
 def _describe_scene_parts_in_file(source_file: str) -> str:
-    """Return a phrase that lists the parts in a source file, for error messages."""
+    """Describe the scene parts that are defined in a source file, for error messages."""
     names = [
         part.name
         for part in _iterate_named_scene_part_classes()
@@ -113,7 +113,7 @@ def _iterate_named_scene_part_classes(base_class: type[Part] = Part) -> Iterator
 
 
 def _find_source_file_of_scene_part(part_class: type[Part]) -> Path | None:
-    """Return the source file of a part class, or None for a notebook class."""
+    """Return the source file of a part class, or None if the class has no source file."""
     try:
         return _resolve_path(inspect.getfile(part_class))
     except (OSError, TypeError):  # Classes that are defined in a notebook have no source file.

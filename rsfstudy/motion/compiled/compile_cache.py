@@ -99,7 +99,7 @@ def compute_code_digest(numba_signature: Any, *functions: Callable[..., Any]) ->
 
 
 def _digest_functions_and_callees(*functions: Callable[..., Any]) -> ObjectDigest:
-    """Compute a digest of functions and of the functions that they call."""
+    """Compute a digest of the given functions and all functions that they call."""
     return ObjectDigest(_is_module_code_digested, _get_compiled_replacement_or_itself).add_object(
         functions
     )
@@ -167,11 +167,11 @@ def compile_cfuncs_and_get_addresses(functions: Sequence[Callable[..., Any]]) ->
 
 
 class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
-    """Numba cache of a function, whose file name contains a content digest.
+    """Numba cache of a function, with a content digest in the names of the cache files.
 
     By default, Numba includes the closure values of a function in the cache key. Closure values
-    include compiled functions, which differ between processes, so Numba would never find a cached
-    function again.
+    include compiled functions, which differ between processes. With the default cache key, Numba
+    would therefore never find a cached function again.
     """
 
     def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
@@ -239,7 +239,7 @@ def _prepare_private_cache_entry_folder(entry_name: str) -> Path | None:
 
 @functools.cache
 def _warn_that_folder_is_not_private(folder: Path) -> None:
-    """Log a warning that other users can write to a folder, once per folder."""
+    """Warn that other users can write to a folder. Each folder causes only one warning."""
     _logger.warning(
         "%s is not private to the current user, so rsfstudy does not use it as a cache of "
         "compiled functions. Remove the directory, or set XDG_CACHE_HOME to another directory.",
@@ -248,7 +248,7 @@ def _warn_that_folder_is_not_private(folder: Path) -> None:
 
 
 def _is_private_folder(folder: Path) -> bool:
-    """Return True if the current user owns a folder, and only this user can write."""
+    """Return True if the current user owns a folder and no other user can write to it."""
     if not hasattr(os, "geteuid"):  # Windows has no numeric owners and modes.
         return True
     found = folder.stat()
@@ -274,12 +274,12 @@ def _compile_in_temporary_folder(
 
 
 def _copy_function_with_compiled_callees(function: Any, cache_entry_path: str = "") -> Any:
-    """Copy a function, and replace its callees by compiled functions.
+    """Copy a function, and replace the functions that it calls with compiled functions.
 
     The qualified name of the copy contains a digest of its content. The digest is necessary because
     a linker treats functions with equal names as the same function. The numbers that Numba adds to
-    function names differ between processes. If ``cache_entry_path`` is given, it becomes the source
-    file of the copy.
+    function names are not sufficient, because they differ between processes. If
+    ``cache_entry_path`` is given, it becomes the source file of the copy.
     """
     named = {
         name: function.__globals__.get(name)

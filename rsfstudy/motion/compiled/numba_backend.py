@@ -255,7 +255,7 @@ def _build_function_address_table(
 ) -> np.ndarray:
     """Build the table of function addresses.
 
-    Both rows of the table contain the force balance function of the slow manifold.
+    Both rows of the table contain the address of the force balance function of the slow manifold.
     """
     rows = np.zeros((2, array_layout.FUNCTION_TABLE_COLUMN_COUNT), dtype=np.int64)
     (

@@ -27,7 +27,7 @@ class Stepper(ABC):
 
     Each motion has its own stepper instance. The arguments ``motion`` and ``workspace`` of the
     methods contain the state of the motion. See ``array_layout.MOTION_STATE_DTYPE`` and
-    ``workspace.Workspace``. A subclass must define ``name`` and the abstract methods.
+    ``workspace.Workspace``. A subclass must define the attribute ``name`` and all abstract methods.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Stepper(ABC):
     name: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
-        """Add the former names of renamed methods to the subclass."""
+        """Add the new names of methods that the subclass defines under former names."""
         super().__init_subclass__()
         copy_former_overrides_to_new_names(cls)
 
@@ -56,10 +56,10 @@ class Stepper(ABC):
 
     @abstractmethod
     def begin_regime(self, motion: Any, workspace: Any) -> None:
-        """Prepare the stepper for the integration of the regime ``motion.regime``.
+        """Prepare the stepper for the integration of the current regime (``motion.regime``).
 
-        The method reads the initial unknowns ``workspace.y`` and must fill in their derivatives
-        ``workspace.rates``. The independent variable ``motion.clock`` is 0. After a kink of the
+        The method reads the initial unknowns from ``workspace.y`` and must store their derivatives
+        in ``workspace.rates``. The independent variable ``motion.clock`` is 0. After a kink of the
         loading, ``motion.next_step_length`` is the proposed step size. Otherwise,
         ``motion.next_step_length`` is 0.
 
@@ -121,7 +121,7 @@ class Stepper(ABC):
     def interpolate_unknowns(
         self, motion: Any, workspace: Any, independent_variable: float
     ) -> None:
-        """Fill in the unknowns ``workspace.y_within`` within the step.
+        """Interpolate the unknowns within the step, and store them in ``workspace.y_within``.
 
         Parameters
         ----------

@@ -258,7 +258,7 @@ def interpolate_unknowns(motion, workspace, independent_variable):
 
 
 def increase_step_length(length, error_over_tolerance, was_rejected_before):
-    """Compute the size of the step after an accepted step.
+    """Compute the size of the next step after an accepted step.
 
     Parameters
     ----------

@@ -39,8 +39,8 @@ class _EvaluationBudgetExceeded(Exception):
 def _build_interpolant_of_unknowns(dense_output: Any) -> Callable[[float], Iterable[float]]:
     """Build a function that interpolates the unknowns within a step.
 
-    For DOP853, the function repeats the operations of SciPy with floats. SciPy's array operations
-    take four times longer for a few unknowns.
+    For DOP853, the function performs the same operations as SciPy, but with Python floats instead
+    of arrays. SciPy's array operations take four times longer for a few unknowns.
     """
     if type(dense_output).__name__ != "Dop853DenseOutput":
         values: Callable[[float], Iterable[float]] = dense_output

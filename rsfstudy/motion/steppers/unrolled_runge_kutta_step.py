@@ -106,7 +106,7 @@ def _build_step_attempt_factory(unknown_count: int) -> AnyCallable:
 
 @cache
 def _compile_weighted_sum_functions() -> dict[str, Any]:
-    """Compile the weighted sums of the derivatives as functions.
+    """Compile one function for each weighted sum of the derivatives.
 
     All systems of equations share the compiled functions.
     """
@@ -122,18 +122,18 @@ def _compile_weighted_sum_functions() -> dict[str, Any]:
 
 
 def _generate_weighted_sum_call(sum_name: str, unknown_index: int) -> str:
-    """Return the source code of a weighted sum for one unknown."""
+    """Return the source code of a call that computes a weighted sum for one unknown."""
     rates = _generate_weighted_sum_argument_code(sum_name).split(", ")
     return f"{sum_name}({', '.join(f'{rate}_{unknown_index}' for rate in rates)})"
 
 
 def _generate_weighted_sum_argument_code(sum_name: str) -> str:
-    """Return the source code of the argument list of a weighted sum."""
+    """Return the source code of the argument list of a weighted-sum function."""
     return ", ".join(f"k{s}" for s in np.flatnonzero(_RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME[sum_name]))
 
 
 def _generate_weighted_sum_expression(sum_name: str) -> str:
-    """Return the source code of the expression of a weighted sum."""
+    """Return the source code of the expression that computes a weighted sum."""
     return " + ".join(
         f"{float(x)!r} * k{s}"
         for s, x in enumerate(_RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME[sum_name])
