@@ -72,7 +72,7 @@ def _digest_cell_fields(
     measure_field_names: tuple[str, ...],
     field_values: tuple[Any, ...],
 ) -> Any:
-    """Compute the digest of the field names and of the non-float values."""
+    """Compute a digest of the names of all fields and of the values that are not floats."""
     names = [
         *(("scene", n) for n in scene_field_names),
         *(("measure", n) for n in measure_field_names),
@@ -175,10 +175,10 @@ class CellPlan:
 def _add_invalid_point_counts_to_error(
     study: Study, cell_number: int, first_error: InvalidValue
 ) -> InvalidValue:
-    """Add the number of invalid axis points to the error message of a cell.
+    """Add the count of invalid points on an axis to the error message of a cell.
 
-    The number is added only if the lattice has an axis with numbered points, for example an axis of
-    random samples.
+    The count is added only if the points of an axis are numbered, for example the points of an axis
+    of random samples.
     """
     if cell_number == study.size:
         return first_error

@@ -1,9 +1,9 @@
 """Digests of user-defined classes and of the measures in named studies.
 
 The digests are computed from the objects in memory, because the source files may have changed since
-the import. Measures that are defined in the modules of named studies are treated like user-defined
-measures, because the other code in these modules does not affect the results. The digests do not
-include the code of Python, of installed packages and of rsfstudy. The module
+the import. The digest of a measure in a named study covers only the measure and the code that it
+uses, because the other code in the module of the study does not affect the results. The digests
+exclude the code of Python, installed packages and rsfstudy itself. The module
 ``module_import_graph`` computes the digests of rsfstudy.
 """
 
@@ -106,7 +106,7 @@ def _is_module_of_named_study(module_name: str | None) -> bool:
 def _is_user_module(module_name: str | None) -> bool:
     """Return True if a module is user-defined.
 
-    Modules of Python, of installed packages and of rsfstudy are not user-defined.
+    Modules that belong to Python, an installed package or rsfstudy are not user-defined.
     """
     top = (module_name or "").partition(".")[0]
     if not top or top == _PACKAGE_NAME or (top in sys.stdlib_module_names and top != "__main__"):

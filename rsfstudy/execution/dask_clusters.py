@@ -27,7 +27,7 @@ _SIGNALS_THAT_END_RUN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def check_script_has_main_guard(worker_count: int) -> None:
-    """Check that worker processes would not run the main script again.
+    """Check that importing the main script does not start the computation again.
 
     Worker processes import the main script. In the main script, the line that starts the
     computation must therefore be inside a condition, such as ``if __name__ == "__main__":``.
@@ -118,7 +118,7 @@ def _wrap_resource_tracker_unregister(unregister: Callable[..., None]) -> Any:
 
 
 def _tolerate_lost_resource_tracker() -> None:
-    """Install ``_wrap_resource_tracker_unregister`` until the process ends.
+    """Replace ``resource_tracker.unregister`` by its wrapper for the lifetime of the process.
 
     The wrapper must stay installed, because semaphores are released whenever they are
     garbage-collected.

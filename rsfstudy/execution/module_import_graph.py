@@ -53,7 +53,7 @@ class ModuleImportGraph:
         return ObjectDigest(lambda _name: False).add_object(self.compute_digests()).hexdigest()
 
     def compute_digests(self, root_modules: Iterable[str] | None = None) -> dict[str, str]:
-        """Compute the digests of modules and of all modules that they import.
+        """Compute the digests of the given modules and of all modules that they import.
 
         Parameters
         ----------
@@ -149,10 +149,9 @@ class _ModuleSource:
 
     @cached_property
     def module_by_lazily_exported_name(self) -> Mapping[str, str] | None:
-        """Modules from which this module lazily exports names.
+        """Mapping from lazily exported names to the names of the modules that define them.
 
-        Each key is an exported name, and each value is the name of a module. If the module does not
-        export names lazily, the value is None.
+        If the module does not export names lazily, the property is None.
         """
         if _LAZY_EXPORT_FUNCTION_NAME.encode() not in self._source:
             return None

@@ -103,9 +103,10 @@ def digest_modules_affecting_results(
 ) -> dict[str, str]:
     """Compute the code digests of the modules that a measure and scenes use.
 
-    The digests include all modules that the measure and the parts of the scenes import, directly
-    or through other modules. A user-defined measure may use any module of rsfstudy, so in this
-    case all modules are included. A user-defined part may use any module of ``slider``.
+    The digests include all modules that the measure and the parts of the scenes import, directly or
+    through other modules. If the measure is user-defined, all modules of rsfstudy are included,
+    because the measure may use any of them. If a part is user-defined, all modules of the
+    ``slider`` package are included.
 
     Parameters
     ----------
@@ -138,8 +139,8 @@ def digest_modules_affecting_results(
 def collect_run_fingerprint(study: Study, example_scenes: Iterable[Scene]) -> dict[str, Any]:
     """Collect all settings, versions and digests that affect the results.
 
-    The fingerprint contains neither the scene fields nor the measure fields, because the keys of
-    the cells are computed from these fields.
+    The fingerprint does not contain the scene fields or the scalar measure fields. The keys of the
+    cells are computed from these fields instead.
 
     Parameters
     ----------
@@ -223,7 +224,7 @@ def build_provenance_attributes(command_line: str) -> dict[str, str]:
 
 @functools.cache
 def _build_cf_source_attribute() -> str:
-    """Build the attribute ``source`` from the version and the commit of rsfstudy."""
+    """Build the value of the ``source`` attribute from the version and commit of rsfstudy."""
     commit = read_git_commit_and_state(_PACKAGE_DIRECTORY.parent)
     return f"rsfstudy {version('rsfstudy')}, commit {commit}, numerical model of a spring-slider"
 

@@ -92,7 +92,7 @@ class OutputOptions:
 class StudyRun:
     """Run of a study.
 
-    Call the run to compute the missing cells and to write the results.
+    Calling a ``StudyRun`` object computes the missing cells and writes the results.
 
     Parameters
     ----------
@@ -145,9 +145,9 @@ class StudyRun:
     def _check_reductions_and_claims(self) -> None:
         """Check that the reductions and claims of the study can be applied.
 
-        The check uses a lattice without results, so that mistakes in a study are found before any
-        cell is computed. If the user changed values of the study, for example with ``--set``, the
-        claims are not checked.
+        The check uses a lattice whose cells are all pending, so mistakes in a study are found
+        before any cell is computed. If the user changed values of the study, for example with
+        ``--set``, the claims are not checked.
         """
         pending = CellResultArrays.build_for_pending_cells(
             self.study.size, self.cell_settings.output_packer.packed_number_count
@@ -243,7 +243,7 @@ class StudyRun:
         cell_batch_mapper: CellBatchMapper,
         progress_callback: ProgressCallback,
     ) -> None:
-        """Compute the cells that are not in the journal, and failed cells."""
+        """Compute the cells that are missing from the journal or that failed in an earlier run."""
         cells = self.plan.unique_cell_numbers
         # Failed cells are computed again.
         answered = journal.read_statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
@@ -349,7 +349,7 @@ class StudyRun:
         )
 
     def _save_partial_results(self, journal: CellJournal, error: BaseException) -> RunError:
-        """Write the finished cells to a file, and build the error for the user."""
+        """Write the finished cells to a file, and return an error that explains how to resume."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.options.output is not None and self.options.format == "netcdf":
             lattice = self.assemble_lattice_dataset(journal)

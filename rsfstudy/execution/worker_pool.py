@@ -165,7 +165,7 @@ class WorkerPool(contextlib.ExitStack):
     def _compute_batches_on_processes(
         self, log_path: Path | None, cell_settings: SharedCellSettings, batches: CellBatchIterator
     ) -> Generator[CellJournalRows]:
-        """Compute batches on local worker processes, and start them if necessary."""
+        """Compute batches on local worker processes, and start the processes if necessary."""
         from rsfstudy.execution import worker_log
 
         try:
@@ -219,7 +219,7 @@ def make_dask_batch_mapper(
             return future
 
         def run_isolated(cell: np.ndarray) -> CellJournalRows:
-            """Compute a cell that may have killed its worker, while no other cell runs.
+            """Compute a cell that may have killed its worker, without other cells in parallel.
 
             If the cell kills its worker repeatedly, the cell is recorded as lost.
             """

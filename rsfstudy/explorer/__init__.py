@@ -1,8 +1,8 @@
 """Interactive views of scenes, results and records, in a browser or a notebook.
 
 A view consists of widgets and plots. A view calls public functions of rsfstudy for every
-computation, so this package contains no physics. A view never writes files. The browser saves the
-files that you download. The modules are:
+computation, so this package contains no physics. A view never writes files. If you download a
+figure or data, the browser saves the file. The modules are:
 
 - ``entry_points`` contains the functions ``explore`` and ``serve``.
 - ``view_creation`` chooses the view of a scene, a dataset or a file.

@@ -60,9 +60,9 @@ def collect_warnings_of_thread() -> Iterator[list[str]]:
 class JobCancelled(KeyboardInterrupt):
     """Raised in the thread of a computation when the user cancels the computation.
 
-    The class is a subclass of ``KeyboardInterrupt``, because studies and fits record every other
-    exception as the outcome of a cell. Cancelling a computation therefore has the same effect as
-    pressing Ctrl-C.
+    Studies and fits record all exceptions except ``KeyboardInterrupt`` as outcomes of cells. The
+    class is therefore a subclass of ``KeyboardInterrupt``, and cancelling a computation has the
+    same effect as pressing Ctrl-C.
     """
 
 
@@ -98,7 +98,7 @@ class BackgroundJobRunner:
     """
 
     def __init__(self, warn: Callable[[Sequence[str]], None]) -> None:
-        """Create the runner without a computation."""
+        """Create a runner that has no running or waiting computation."""
         self._warn = warn
         self._bar = pn.indicators.Progress(
             active=True, value=-1, max=1000, sizing_mode="stretch_width", margin=(12, 5)
@@ -233,7 +233,7 @@ class BackgroundJobRunner:
 
 
 def _call_in_page_thread(job: _BackgroundJob, function: Callable[[], None]) -> None:
-    """Call a function in the thread of the page, or immediately if there is no page."""
+    """Call a function in the thread of the page, or in this thread if there is no page."""
     if job.bokeh_document is None or not job.bokeh_document.session_context:
         function()
     else:

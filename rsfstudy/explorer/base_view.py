@@ -39,7 +39,7 @@ setTimeout(() => { button.label = "Copy" }, 1500)
 
 
 class ExplorerView(ABC):
-    """Base class that adds code, downloads and messages to the widgets of a view.
+    """Base class of views, with displayed code, download buttons and error messages.
 
     A subclass creates its widgets in ``__init__``, and implements the abstract methods. The
     subclass calls ``update_displayed_code_and_url`` after each change to its widgets. To handle
@@ -125,7 +125,7 @@ class ExplorerView(ABC):
 
     @abstractmethod
     def format_equivalent_python_code(self) -> str:
-        """Return Python code that reproduces the numbers of the view.
+        """Return Python code that reproduces the numbers shown in the view.
 
         Returns
         -------
@@ -135,7 +135,7 @@ class ExplorerView(ABC):
 
     @abstractmethod
     def format_equivalent_command_line(self) -> str:
-        """Return a command line that reproduces the numbers of the view.
+        """Return a command line that reproduces the numbers shown in the view.
 
         Returns
         -------
@@ -145,7 +145,7 @@ class ExplorerView(ABC):
 
     @abstractmethod
     def draw_figure_for_download(self) -> Figure:
-        """Return the figure for a publication.
+        """Return a figure of the view that is suitable for a publication.
 
         Returns
         -------
@@ -174,7 +174,7 @@ class ExplorerView(ABC):
         """
 
     def build_status_tables(self) -> list[Any]:
-        """Return the contents of the tab "Status".
+        """Return the contents of the "Status" tab.
 
         Returns
         -------

@@ -92,7 +92,7 @@ def recompute_cell_and_motion(
 
     If the measure records the motion, for example a limit cycle, the result contains the recorded
     motion. Otherwise, the motion of the scene is simulated. If the measure solves for a critical
-    load, the motion is simulated at the load that the measure has verified to be unstable.
+    load, the motion is simulated at a load for which the measure has verified instability.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def recompute_cell_and_motion(
 def _extract_recorded_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[xr.Dataset | None, str, str]:
-    """Return the motion recorded by a measure, with an explanation and its code."""
+    """Return the motion recorded by a measure, an explanation, and code for the motion."""
     dims = measure.variables.get("log10_slip_rate", ())
     names = [n for n in outcome.values if measure.variables[n] == dims]
     if len(dims) != 1 or not {*_X_VARIABLES_OF_MOTION_PLOT} & {*names}:
@@ -203,8 +203,8 @@ def tabulate_recomputed_outcome(
 def draw_motion_figures(motion: xr.Dataset, figure_height: int = 240) -> list[Any]:
     """Return Bokeh figures of stress and slip rate against displacement or time.
 
-    If the slip rate of a motion without inertia and damping exceeds the instability norm, the
-    curves end at the norm, because the rest of the motion has no physical meaning.
+    If a motion without inertia and damping becomes unstable, its slip rate exceeds the instability
+    norm. The curves end at that time, because the rest of the motion has no physical meaning.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ def has_one_value_per_cell(dataset: xr.Dataset, variable_name: str) -> bool:
 def iterate_panel_selections(
     dataset: xr.Dataset, selection: PlotSelection
 ) -> Iterator[PlotSelection]:
-    """Yield one selection per panel, with a fixed point of the facet dimension.
+    """Yield one selection per panel, each at a different point of the facet dimension.
 
     At most 12 evenly spaced points of the facet dimension are used.
     """
@@ -210,7 +210,7 @@ def extract_curves_of_panel(dataset: xr.Dataset, panel: PlotSelection) -> list[C
 def _broadcast_x_values(
     dataset: xr.Dataset, panel: PlotSelection, x_dimension: str, shape: tuple[int, ...]
 ) -> np.ndarray:
-    """Return the values along x of all curves. Names are numbered from 0."""
+    """Return the x values of all curves. If the values are names, return their indices."""
     values = dataset[panel.x] if panel.x in dataset.variables else dataset[x_dimension]
     if values.dtype.kind not in "iuf":
         return np.broadcast_to(np.arange(shape[-1], dtype=float), shape)

@@ -124,7 +124,7 @@ class FitChoices:
         return found
 
     def add_stiffness_for_slip_record(self, reading_arguments: dict[str, Any]) -> dict[str, Any]:
-        """Add the stiffness, which is required for a record of slip.
+        """Add the stiffness, which is required if the recorded displacement is the slip.
 
         Parameters
         ----------
@@ -175,7 +175,7 @@ class FitChoices:
     def find_step_number_at_excluded_time(
         self, steps: Sequence[LoadingStep], excluded_time: float
     ) -> int | None:
-        """Return the number of the step at a time that the user has excluded.
+        """Return the number of the step that is closest to an excluded time.
 
         Parameters
         ----------

@@ -39,7 +39,7 @@ class SliderRange(NamedTuple):
     def choose_for_field(
         cls, default_value: float, typical_value: float, validation_rule: str, scale_name: str
     ) -> SliderRange:
-        """Choose the range of a field from its declaration.
+        """Choose the range of a slider from the declaration of the field.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class NumberWidget:
             self._changed(event.new)
 
     def _set_value_without_callback(self, widget: Any, value: float) -> None:
-        """Set the value of a widget without calling the function ``changed``."""
+        """Set the value of a widget without calling the callback for changed values."""
         self._is_moved_by_code = True
         try:
             widget.value = value

@@ -31,7 +31,7 @@ _STATUS_AND_COST_VARIABLES = ("status", "rhs_evaluations", "wall_time")
 
 @dataclass(frozen=True)
 class PlotSelection:
-    """Variable, axes and points of a plot.
+    """Selected variable, plot axes, and fixed points of the remaining dimensions.
 
     Parameters
     ----------
@@ -188,14 +188,14 @@ def complete_plot_selection(
 
 
 def _check_choice_exists(choice_name: str, value: Any, choices: Sequence[str]) -> Any:
-    """Return a requested choice, and raise ``InvalidValue`` if it does not exist."""
+    """Return a requested choice, or raise ``InvalidValue`` if the choice does not exist."""
     if value is not None and value not in choices:
         raise InvalidValue(choice_name, value, "does not exist in these results", choices=choices)
     return value
 
 
 def _choose_default_x_name(dataset: xr.Dataset, variable_name: str, choices: Sequence[str]) -> str:
-    """Return the last dimension inside the cells, or else the longest dimension."""
+    """Return the last choice that is not a lattice dimension, or else the longest choice."""
     if inner := [d for d in _list_non_lattice_dimensions(dataset, variable_name) if d in choices]:
         return inner[-1]
     return max(reversed(choices), key=lambda name: dataset[name].size)
@@ -204,7 +204,11 @@ def _choose_default_x_name(dataset: xr.Dataset, variable_name: str, choices: Seq
 def _choose_default_second_dimension(
     dataset: xr.Dataset, candidates: Sequence[str], plot_kind: str | None
 ) -> str:
-    """Return the largest dimension for which all curves can be distinguished."""
+    """Return the largest candidate dimension.
+
+    For curves, dimensions with too many points are excluded, so that all curves can be
+    distinguished.
+    """
     if plot_kind == MAP:
         return max(candidates, key=lambda name: dataset.sizes[name])
     few = [d for d in candidates if 1 < dataset.sizes[d] <= _MAX_CURVES_OF_DEFAULT_SELECTION]

@@ -227,13 +227,13 @@ class RecordPlot:
             )
 
     def _add_record_curve(self, column_name: str) -> ColumnDataSource:
-        """Add the line of a column of the record."""
+        """Add an empty curve for a column of the record."""
         source = ColumnDataSource({"x": [], "y": []})
         self.figures[column_name].line("x", "y", source=source, color="#8c8c8c", line_width=1)
         return source
 
     def _add_step_and_window_marks(self) -> None:
-        """Add the marks of steps, of holds and of the window to all figures."""
+        """Add marks for the steps, the holds and the window to all figures."""
         self.mark_steps_and_holds((), ())
         strip = self.figures["steps"]
         marks = {"source": self._steps, "color": "color"}
@@ -313,7 +313,7 @@ class RecordPlot:
     def _thin_fit_variable(
         self, fit_variables: dict[str, Any], variable_name: str
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Thin the rows of a fit, without the rows in which a variable is NaN."""
+        """Thin the curve of a fit variable, ignoring the rows in which the variable is NaN."""
         known = np.isfinite(fit_variables[variable_name])
         x = fit_variables[f"record_{self._x_name}"][known]
         return thin_curve_to_pixels(
@@ -359,12 +359,12 @@ class RecordPlot:
 
 
 def _is_box_selection_tool(tool: Any) -> bool:
-    """Return True if a tool is the selection tool of a figure or the toolbar."""
+    """Return True if a tool is a box selection tool, or a group of box selection tools."""
     return isinstance(getattr(tool, "tools", [tool])[0], BoxSelectTool)
 
 
 def _iterate_fit_curves_and_styles(fit_dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """Yield the curves of each fit in a dataset, in the line style of its law."""
+    """Yield the curves of each fit in a dataset, with the plot style of the friction law."""
     laws = fit_dataset["law"].values.tolist()
     with style_context():
         colors = [cycle_style(number)["color"] for number in range(len(laws))]

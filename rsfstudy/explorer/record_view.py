@@ -240,7 +240,7 @@ class RecordView(ExplorerView):
         self._steps.value = sorted(included)
 
     def _store_excluded_step_times(self) -> None:
-        """Store the times of the steps that the user excluded in the window."""
+        """Store the times of the excluded steps in the window."""
         assert self._window is not None
         steps, choices = self._window.loading_steps, self.fit_choices
         kept = [
@@ -322,7 +322,7 @@ class RecordView(ExplorerView):
         return "\n".join([*lines, "print(fit.rsf.fit_table().T)"])
 
     def format_equivalent_command_line(self) -> str:
-        """Return the command ``rsfstudy fit`` with the options of the choices."""
+        """Return the ``rsfstudy fit`` command with the options that match the user's choices."""
         if not self._record_file_path:
             return "# The command line needs a record in a file."
         reading = self._reading | self.fit_choices.build_window_limit_arguments()
@@ -355,7 +355,7 @@ class RecordView(ExplorerView):
 
 
 def _call_with_document_lock(method: Callable[[], None]) -> None:
-    """Call a method that changes Bokeh models while holding the document lock."""
+    """Hold the document lock while calling a method that changes Bokeh models."""
     document = pn.state.curdoc
     if document is None or not document.session_context:
         method()

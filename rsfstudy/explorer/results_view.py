@@ -67,7 +67,7 @@ _PLOT_KIND_BY_LABEL = {"Lines": LINES, "Map": MAP}
 
 
 class ResultsView(ExplorerView):
-    """View of study results: a plot, the figure declared by the study, and cells.
+    """View of study results, with a plot, the figure of the study, and single cells.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ class ResultsView(ExplorerView):
             )
 
     def _build_selection_with_points(self, point_indices: Mapping[str, int]) -> PlotSelection:
-        """Return the selection with other points."""
+        """Return a copy of the selection with different fixed points."""
         wishes = {name: getattr(self.selection, name) for name in _SELECTION_FIELD_NAMES}
         return complete_plot_selection(self.shown, **wishes, points=point_indices)
 

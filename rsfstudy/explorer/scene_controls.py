@@ -242,7 +242,7 @@ class SceneControls:
         ]
 
     def _find_fields_without_widget(self) -> set[str]:
-        """Return the fields that the rig or a menu sets, and that need no widget."""
+        """Return the fields that need no widget, because the rig or a menu sets them."""
         if self._rig is None:
             return {"inertia"}
         return _FIELDS_DERIVED_FROM_RIG - (

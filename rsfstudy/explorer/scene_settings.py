@@ -134,11 +134,14 @@ class SceneSettings:
         return cls(converted, quantities, protocol=protocol)
 
     def as_widget_state(self) -> dict[str, Any]:
-        """Return the settings as plain values, without empty settings."""
+        """Return the settings as a dictionary, without empty settings."""
         return {name: value for name, value in asdict(self).items() if value}
 
     def with_changed_field(self, field_name: str, value: Any) -> Self:
-        """Return settings in which a field is changed, or removed if the value is None."""
+        """Return a copy of the settings with one scene field changed.
+
+        If the value is None, the field is removed.
+        """
         changed = {n: v for n, v in self.scene.items() if n != field_name}
         return replace(self, scene=changed if value is None else changed | {field_name: value})
 
@@ -227,7 +230,7 @@ class SceneSettings:
         return "\n".join(lines)
 
     def _format_simulate_arguments(self) -> str:
-        """Return the arguments of ``rsfstudy.simulate`` after the scene."""
+        """Format the arguments that follow the scene in a call of ``rsfstudy.simulate``."""
         engine = f', engine="{choose_fastest_engine()}"'
         if not self.duration:
             return engine
@@ -344,7 +347,7 @@ def get_rig_scale_in_display_units(rig: Rig, scale_name: str) -> float:
 
 
 def _find_user_defined_parts() -> dict[str, Any]:
-    """Return the user-defined parts that this process has used, by name."""
+    """Return a mapping from names to the user-defined parts that this process has used."""
     return {name: part for slot in SceneFields.PART_SLOTS for name, part in slot.user_parts.items()}
 
 

@@ -42,7 +42,7 @@ _TWO_COLUMN_GRID_STYLE = {
 
 
 class ComputedMotion(NamedTuple):
-    """Motion of a scene, with the sentences that describe it.
+    """Motion of a scene, with tables and sentences that describe the motion.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class ComputedMotion(NamedTuple):
         }
 
     def _convert_slip_rates_to_display_units(self, log10_slip_rates: np.ndarray) -> np.ndarray:
-        """Return slip rates in the units of the page."""
+        """Convert logarithms of slip rates to slip rates in the units shown on the page."""
         scale = self.rig.reference_velocity * 1e6 if self.rig else 1.0
         return np.asarray(scale * 10.0 ** np.minimum(log10_slip_rates, 300.0))
 
@@ -207,11 +207,11 @@ class SimulationView(ExplorerView):
     # ---- interface of View ----------------------------------------------------------------------
 
     def list_control_widgets(self) -> list[Any]:
-        """Return the preset, the fields of the scene and the duration."""
+        """Return the widgets for the preset, the scene fields and the duration."""
         return [self._preset, self._controls.column, self._duration]
 
     def list_plot_panes(self) -> list[Any]:
-        """Return the verdict and the four plots."""
+        """Return the description of the stability, the peak values and the plots."""
         grid = pn.Column(
             *map(pn.pane.Bokeh, self._figures.values()),
             sizing_mode="stretch_width", styles=_TWO_COLUMN_GRID_STYLE,
@@ -244,11 +244,11 @@ class SimulationView(ExplorerView):
         return plot_motion(result.dimensionless_motion, result.rig)
 
     def build_table_for_download(self) -> pd.DataFrame:
-        """Return the motion with one row per time."""
+        """Return the motion as a table with one row per time."""
         return self._require_computed_motion().motion_in_display_units.to_dataframe().reset_index()
 
     def build_dataset_for_download(self) -> xr.Dataset:
-        """Return the motion in the units of the page."""
+        """Return the motion as a dataset, in the units shown on the page."""
         return self._require_computed_motion().motion_in_display_units
 
     # ---- changes --------------------------------------------------------------------------------

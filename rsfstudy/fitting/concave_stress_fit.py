@@ -9,9 +9,9 @@ the concave function and the minimum of the convex function. The fit has no smoo
 it describes a sudden drop after linear loading as well as a gradual maximum of stress.
 
 A concave piecewise linear function with nodes at all samples has as many parameters as samples, but
-the constraint makes the slope change at only a few nodes. The standard errors are those of a linear
-least-squares fit with these nodes. The actual standard deviation is smaller by up to a factor of
-two, because the constraint also reduces the variance.
+the constraint makes the slope change at only a few nodes. The standard errors are computed from a
+linear least-squares fit with only these nodes. These standard errors exceed the actual standard
+deviation by up to a factor of two, because the constraint also reduces the variance.
 
 References
 ----------
@@ -86,7 +86,7 @@ class _ConcaveFit(NamedTuple):
 
     @property
     def scaled_residuals(self) -> np.ndarray:
-        """Residuals of the samples, corrected for the number of fitted parameters."""
+        """Residuals of the samples, scaled to account for the number of fitted parameters."""
         count = len(self.residuals)
         freedom = max(count - self.design_matrix.shape[1], 1)
         return np.asarray(self.residuals * math.sqrt(count / freedom))
@@ -96,8 +96,9 @@ class _ConcaveFit(NamedTuple):
 
         The maximum of the concave function underestimates the stress before a sudden drop, because
         the function can follow the noise of the last samples downwards. Therefore, the function is
-        also fitted without the insignificant changes of slope. Both fits give limits of the highest
-        stress, and the result is the midpoint of these limits.
+        also fitted without the insignificant changes of slope. Each fit gives a lower and an upper
+        limit of the highest stress. The result is the midpoint between the smaller lower limit and
+        the larger upper limit.
 
         Parameters
         ----------
@@ -120,7 +121,7 @@ class _ConcaveFit(NamedTuple):
         return 0.5 * (low + high), max(stderr, limits[2]), 0.5 * (high - low)
 
     def _remove_insignificant_slope_changes(self, variance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the design matrix and fitted values without insignificant slope changes."""
+        """Remove insignificant slope changes, and return the design matrix and fitted values."""
         columns, root = self.design_matrix, np.sqrt(self.weights)
         while True:
             inverse = np.linalg.pinv(columns * root[:, None])
@@ -222,11 +223,11 @@ def measure_stress_extrema(
 def _fit_longest_concave_part(
     time: np.ndarray, stress: np.ndarray, limits: tuple[float, float, float]
 ) -> _ConcaveFit | None:
-    """Fit a concave function to the longest range of samples that it describes.
+    """Find the longest range of samples that a concave function describes, and fit the function.
 
-    The samples extend from the midpoint between the previous drop and this drop to the middle of
-    this drop. The number of samples before the drop is halved until a concave function describes
-    them within the noise.
+    The initial range of samples begins midway between the previous drop and this drop, and ends at
+    the middle of this drop. The number of samples before the drop is halved until a concave
+    function describes these samples within the noise.
 
     Parameters
     ----------
@@ -334,7 +335,7 @@ def _fit_concave_function(time: np.ndarray, stress: np.ndarray, corner: int) -> 
 
 
 def _build_block_edges(count: int) -> np.ndarray:
-    """Return block edges whose spacing increases in proportion to the distance."""
+    """Return block edges whose spacing is proportional to the distance from the corner."""
     edges = [0]
     while edges[-1] < count:
         length = max(int(_BLOCK_SIZE_OVER_DISTANCE * edges[-1]), 1)

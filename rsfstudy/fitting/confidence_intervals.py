@@ -46,7 +46,7 @@ from rsfstudy.fitting.window_model import convert_fit_coordinate_to_parameter
 
 
 def compute_student_t_quantile(fit_solution: FitSolution, confidence_level: float) -> float:
-    """Compute the half-width of a confidence interval in units of standard error.
+    """Compute the half-width of a confidence interval in units of the standard error.
 
     Parameters
     ----------
@@ -193,12 +193,12 @@ class LikelihoodProfile:
         return float(self.best_coordinates[self.parameter_index] + direction_sign * at)
 
     def compute_twice_log_likelihood_decrease(self, fit_coordinate: float) -> float:
-        """Compute the squared distance of a parameter from its best value.
+        """Compute twice the decrease in the log-likelihood from the best value of a parameter.
 
-        The squared distance between a value of the parameter and the best value is twice the
-        decrease in the log-likelihood. The squared distance is equal to the increase in the sum of
-        squared residuals, divided by the noise variance. If the log-likelihood is nearly quadratic,
-        the method returns the quadratic approximation.
+        This quantity is the squared distance between a given value of the parameter and the best
+        value. The squared distance is equal to the increase in the sum of squared residuals,
+        divided by the noise variance. If the log-likelihood is nearly quadratic, the method returns
+        the quadratic approximation.
 
         Parameters
         ----------
@@ -263,14 +263,15 @@ class LikelihoodProfile:
         )
 
     def _compute_sum_of_squares_above_minimum(self, residuals: np.ndarray) -> float:
-        """Return the difference between a sum of squares and its minimum."""
+        """Return the sum of squared residuals minus the minimum sum of squares of the fit."""
         return float(residuals @ residuals - np.square(self.solution.whitened_residuals).sum())
 
     def _compute_linearised_excess_sum_of_squares(self, fit_coordinates: np.ndarray) -> float:
-        """Compute the increase in the sum of squares with a linearised model.
+        """Use a linearised model to compute the increase in the sum of squares.
 
-        The result is the difference between the sum of squares and its minimum. The sum of squares
-        is minimised with respect to all parameters except the parameter of the profile likelihood.
+        The parameter of the profile likelihood is fixed, and the sum of squares is minimised with
+        respect to all other parameters. The result is this sum of squares minus the minimum sum of
+        squares of the fit.
         """
         left = self._compute_whitened_residuals(fit_coordinates)
         if not np.isfinite(left).all():

@@ -19,9 +19,10 @@ def displacement_is_slip(
     """Return True if a displacement is the slip of the fault.
 
     At a velocity step, the load point changes from one constant velocity to another constant
-    velocity. The slip rate of the fault, in contrast, is not constant before or after the step. If
-    the displacement is the slip of the fault, only the sum of the displacement and the elastic
-    shortening of the machine therefore has constant velocities.
+    velocity. The slip rate of the fault, in contrast, is not constant before or after the step. The
+    load point displacement is the sum of the slip and the elastic shortening of the machine. If the
+    displacement is the slip of the fault, only this sum has a constant velocity before and after
+    the step.
 
     Parameters
     ----------

@@ -254,7 +254,7 @@ class Filter:
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def _compute_averaging_time_on_each_side(self) -> tuple[float, float]:
-        """Return the durations in s of the averaging interval before and after a row."""
+        """Return how many seconds the averaging interval extends before and after a row."""
         return (
             (0.5 * self.averaging_time_or_frequency, 0.5 * self.averaging_time_or_frequency)
             if self.kind == MEAN

@@ -303,7 +303,7 @@ class Fit(Measure):
 
     @property
     def output_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Names of the parameters, and indices of the rows and draws."""
+        """Coordinates of the outputs: parameter names, row indices and draw indices."""
         names = np.array(self.parameters, dtype=object)
         together = sum(map(len, self._first_output_row_by_record))
         rows = np.arange(together if self.together else max(map(len, self.records)))
@@ -315,8 +315,8 @@ class Fit(Measure):
 
         The numerical error of a parameter is divided by its scale. The scale is the absolute value
         of the parameter plus a large multiple of the standard error of the parameter. If a
-        parameter may be zero, a constant is added to its scale, because the standard error is also
-        zero if the record has no noise.
+        parameter may be zero, a constant is added to its scale. Without this constant, the scale
+        would be zero for a record without noise, because the standard error would also be zero.
 
         Parameters
         ----------
@@ -358,7 +358,7 @@ class Fit(Measure):
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Raise ``InvalidValue``, because result files do not contain the records.
+        """Raise ``InvalidValue``, because a fit cannot be restored without its records.
 
         Parameters
         ----------

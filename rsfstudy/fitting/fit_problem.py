@@ -307,10 +307,9 @@ class FitProblem:
         return found
 
     def _find_initial_fit_coordinates(self) -> np.ndarray:
-        """Return the initial coordinates with the best slip distance.
+        """Return the initial coordinates, with the best of several tested slip distances.
 
-        The method tests several initial slip distances, and selects the slip distance with the
-        smallest residuals.
+        The best slip distance is the slip distance with the smallest sum of squared residuals.
         """
         # Check the initial guess, because the search treats invalid parameters like failed
         # simulations.
@@ -635,7 +634,7 @@ def _has_converged(
     whitened_jacobian_and_residuals: np.ndarray,
     tolerance: float = _NOISE_PASS_TOLERANCE,
 ) -> bool:
-    """Return True if the last parameter changes are much smaller than their errors.
+    """Return True if the last change in each parameter is well below its standard error.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ class FitWindow:
 
     @property
     def window_summary_values(self) -> dict[str, float]:
-        """Velocities, window limits in um, normal stress and load point noise."""
+        """Step velocities, window limits in um, normal stress and load point noise, by name."""
         record, rows = self.record, self.record_row_indices
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {

@@ -298,9 +298,9 @@ class HoldFit:
 
     @cached_property
     def _noise_reference_fit(self) -> GeneralisedLeastSquaresFit:
-        """Fit to rows without a friction peak.
+        """Fit to rows that do not contain a friction peak.
 
-        The noise of this fit is used to select windows.
+        The noise estimated by this fit is used to select windows.
         """
         rows, after = self.hold.steady_rows_before_hold, self.rows_after
         if len(after) > 1:

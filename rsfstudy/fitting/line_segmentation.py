@@ -3,15 +3,15 @@ r"""Piecewise linear segmentation of the rows of a record.
 Let :math:`S(i, j)` be the sum of squared residuals of the line fitted to the rows i to j. Binary
 segmentation [1]_ [2]_ splits the rows at the row k that minimises :math:`S(i, k) + S(k, j)`. A
 split is accepted if it reduces the sum of squares by more than :math:`12 \ln(j - i)` times the
-noise variance, which is far more than expected by chance.
+noise variance. This threshold is far larger than the reduction expected by chance.
 
-If a range of rows contains several changes in slope, the first split is biased [3]_: it often lies
-a few rows from a change. If the first split misses the change by fewer than 5 rows, later splits
-cannot correct it, because a segment must have at least 5 rows. A false segment with an intermediate
-slope then spans the change. For this reason, the boundaries are refined afterwards. Each boundary
-moves to the row between its two neighbouring boundaries that minimises the sum of squares. Two
-neighbouring boundaries are replaced by a single boundary if three lines do not fit significantly
-better than two lines.
+If a range of rows contains several changes in slope, the first split is biased [3]_ and often lies
+a few rows away from the nearest change. If the first split misses the change by fewer than 5 rows,
+later splits cannot correct it, because a segment must have at least 5 rows. A false segment with an
+intermediate slope then spans the change. For this reason, the boundaries are refined afterwards.
+Each boundary is moved between its two neighbouring boundaries to the row with the smallest sum of
+squares. Two neighbouring boundaries are replaced by a single boundary if three lines do not fit
+significantly better than two lines.
 
 References
 ----------
@@ -273,7 +273,7 @@ class SegmentBoundaryRefinement:
     def fit_adjacent_lines(
         self, start_row: int, boundary: int, stop_row: int
     ) -> tuple[InterceptAndSlope, InterceptAndSlope]:
-        """Fit the two lines next to a boundary, from at most ``max_rows`` rows each.
+        """Fit one line on each side of a boundary, using at most ``max_rows`` rows per line.
 
         Parameters
         ----------
@@ -292,7 +292,7 @@ class SegmentBoundaryRefinement:
     def _limit_rows(
         self, start_row: int, first_boundary: int, last_boundary: int, stop_row: int
     ) -> tuple[int, int]:
-        """Limit a range of rows to the neighbourhood of its boundaries."""
+        """Limit a range to at most ``max_rows`` rows before and after its boundaries."""
         return (
             max(start_row, first_boundary - self.max_rows),
             min(stop_row, last_boundary + self.max_rows),
@@ -312,11 +312,11 @@ class SegmentBoundaryRefinement:
         )
 
     def _find_best_boundary(self, start_row: int, boundary: int, stop_row: int) -> int:
-        """Return the boundary of the two lines with the smallest sum of squares.
+        """Fit two lines, and return the boundary with the smallest sum of squares.
 
-        The boundary does not move if the residuals of the two lines are much larger than the noise.
-        In this case, slow deviations from the lines, such as periodic errors of a drive screw,
-        dominate the sum of squares, and its minimum may be far from the change in slope.
+        If the residuals of the best two lines are much larger than the noise, the boundary is not
+        moved. In this case, slow deviations from the lines, such as periodic errors of a drive
+        screw, dominate the sum of squares, and its minimum may be far from the change in slope.
         """
         i, j = self._limit_rows(start_row, boundary, boundary, stop_row)
         at, sums = np.arange(MIN_SEGMENT_ROWS, j - i - MIN_SEGMENT_ROWS + 1), self._sum(i, j)

@@ -78,7 +78,7 @@ def find_start_of_linear_friction(
 
 
 def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
-    """Find the row at which two separate lines fit friction best.
+    """Find the row that divides friction into the two lines with the smallest residuals.
 
     Returns
     -------

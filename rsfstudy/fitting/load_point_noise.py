@@ -78,9 +78,9 @@ def integrate_load_point_velocity(
 ) -> np.ndarray:
     """Integrate the load point velocity to obtain the displacement.
 
-    In contrast to the recorded displacement, the computed displacement has no noise. Noise in the
-    recorded displacement would bias the trend in generalised least squares, because the noise
-    dominates the differences between neighbouring rows.
+    In contrast to the recorded displacement, the computed displacement has no noise. In the
+    recorded displacement, noise dominates the differences between neighbouring rows. Generalised
+    least squares uses these differences, so the noise would bias the fitted trend.
 
     Parameters
     ----------

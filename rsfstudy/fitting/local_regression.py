@@ -241,7 +241,7 @@ def find_polynomial_maximum_position(coefficients: np.ndarray) -> float:
 def _compute_polynomial_residual_squares(
     polynomial_and_sample_columns: np.ndarray, degree: int
 ) -> float:
-    """Fit the last column by other columns, and return the residual sum of squares."""
+    """Fit a polynomial to the last column, and return the residual sum of squares."""
     basis = np.linalg.qr(polynomial_and_sample_columns[:, : degree + 1])[0]
     left = polynomial_and_sample_columns[:, -1] - basis @ (
         basis.T @ polynomial_and_sample_columns[:, -1]

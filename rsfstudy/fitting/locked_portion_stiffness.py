@@ -17,13 +17,14 @@ hold. The solution is
     \mu = \mu_1 + k x + \frac{a}{g} \ln\left[1 - g v_1 \left(e^{k x/a} - 1\right)\right],
 
 where :math:`\mu_1` and :math:`v_1` are the values at :math:`x = 0`. The curve is fitted by
-generalised least squares with correlated noise. The parameters :math:`a` and :math:`g` have broad
-prior distributions, so the standard error of :math:`k` includes the uncertainty of the slip.
+generalised least squares with correlated noise. The direct effect :math:`a` and the constant
+:math:`g` have broad prior distributions. The standard error of the stiffness :math:`k` therefore
+includes the uncertainty due to the slip.
 
 Friction may have a trend during sliding. A trend with load point displacement contributes to the
 slope of a locked portion, whereas a trend with slip does not. The fit does not distinguish between
-the two cases. Half of the trend is therefore subtracted from the stiffness, and the other half is
-included in the standard error.
+these two kinds of trend. Half of the trend is therefore subtracted from the stiffness, and the
+other half is included in the standard error.
 """
 
 from __future__ import annotations

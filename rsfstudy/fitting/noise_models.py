@@ -11,11 +11,11 @@ where :math:`S` is the sum of squared residuals of generalised least squares.
 
 The noise is an autoregressive process :math:`e_i = c_1 e_{i-1} + \dots + c_m e_{i-m} + w_i` with
 white noise :math:`w`. The process is stationary if all partial autocorrelations are between -1 and
-1, so the search varies the partial autocorrelations [2]_. The Burg method [3]_ provides the initial
-guess.
+1. The search therefore varies the partial autocorrelations instead of the coefficients [2]_. The
+Burg method [3]_ provides the initial guess.
 
-The REML search does not change the order :math:`m`. The noise model "ar" selects the order before
-the search, by minimising the Akaike information criterion (AIC) of the Burg coefficients. The
+The REML search does not change the order :math:`m`. Before the search, the "ar" noise model selects
+the order that minimises the Akaike information criterion (AIC) of the Burg coefficients. The
 autoregressive order is the same for all sampling intervals. The function
 ``fit_solution.compute_aic`` computes another quantity, the corrected AIC of the complete fit.
 

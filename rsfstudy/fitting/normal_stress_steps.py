@@ -48,7 +48,7 @@ _STANDARD_DEVIATION_PER_MAD = 1.4826
 
 
 class NormalStressStep(NamedTuple):
-    """Step of normal stress at a constant rate of change.
+    """Step of normal stress, during which the normal stress changes at a constant rate.
 
     Parameters
     ----------

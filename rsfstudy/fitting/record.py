@@ -147,7 +147,7 @@ class Record:
         return told.hexdigest()[:16]
 
     def __repr__(self) -> str:
-        """Return the name, the number of rows, the columns and the number of steps."""
+        """Return a string with the name, the numbers of rows and steps, and the columns."""
         units = {about.name: about.units for about in RECORD_COLUMNS}
         columns = ", ".join(
             name if units[name] == "1" else f"{name} ({units[name]})" for name in self.columns

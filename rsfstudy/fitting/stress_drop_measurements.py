@@ -318,7 +318,7 @@ def _measure_slip_of_drop(
 
 
 def _bound_sampling_error(rates: np.ndarray, fastest: int) -> float:
-    """Bound the amount by which sampling underestimates the peak slip rate.
+    """Compute an upper limit of the amount by which sampling underestimates the peak slip rate.
 
     The mean slip rate over a sampling interval is smaller than the peak slip rate. The upper limit
     of the difference is the largest mean slip rate minus the mean of the two neighbouring slip
@@ -347,7 +347,7 @@ def _bound_sampling_error(rates: np.ndarray, fastest: int) -> float:
 def _find_successive_rates_above(
     rates: np.ndarray, fastest: int, threshold: float
 ) -> tuple[int, int]:
-    """Return the range of indices around the peak with slip rates above a threshold."""
+    """Return the range of indices around the peak in which slip rates exceed a threshold."""
     slow = np.flatnonzero(rates <= threshold)
     after = int(np.searchsorted(slow, fastest))
     first = int(slow[after - 1]) + 1 if after else 0

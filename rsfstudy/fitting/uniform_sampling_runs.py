@@ -144,7 +144,7 @@ def count_noise_processes(sampling_runs: Sequence[UniformSamplingRun]) -> int:
 def expand_run_field_to_rows(
     sampling_runs: Sequence[UniformSamplingRun], run_field_name: str
 ) -> np.ndarray:
-    """Return the index of the noise process or the noise level of each row.
+    """Return the noise process index or the noise level index of each row.
 
     Parameters
     ----------

@@ -89,7 +89,7 @@ class LoadingStep(NamedTuple):
 
     @property
     def middle_time(self) -> float:
-        """Time in s of an immediate step that results in the same displacement.
+        """Time in s at which an immediate step would result in the same final displacement.
 
         If a record has few rows before a step, the detected step may last longer than the actual
         step. The middle of the detected step is then more accurate than its ends.
@@ -159,10 +159,9 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
 
 
 def _move_to_nearest_rows(step: LoadingStep, time: np.ndarray) -> LoadingStep:
-    """Move the ends of a step to the times of rows within the rounding error.
+    """Move the start and end of a step to row times that are equal within rounding errors.
 
-    A row at the time of a step then belongs to the same window of the record, regardless of the
-    order of the arithmetic operations.
+    Rounding errors then do not affect which window contains a row at the time of a step.
     """
 
     def move(at: float) -> float:

@@ -1,8 +1,8 @@
 """Model of friction in a window of a record.
 
 A ``WindowModel`` simulates the motion of a scene under the loading of a record. The method
-``model_friction`` computes friction at each row, and the method ``jacobian`` computes the
-derivatives of friction with respect to the parameters.
+``compute_model_friction`` computes friction at each row, and the method ``compute_jacobian``
+computes the derivatives of friction with respect to the parameters.
 """
 
 from __future__ import annotations
@@ -299,9 +299,9 @@ class WindowModel:
         """Compute the friction of the model at each row, without the trend.
 
         The motion starts from steady sliding before the first step. As in an experiment, friction
-        is the spring stress divided by the normal stress. If the loading is delayed by
-        ``step_time``, the simulated motion is evaluated at times that are earlier by the same
-        delay.
+        is the spring stress divided by the normal stress. The parameter ``step_time`` is a delay of
+        the loading. The delay is subtracted from the times at which the simulated motion is
+        evaluated.
 
         Parameters
         ----------
