@@ -8,8 +8,8 @@ The former names will be removed in version 1.0.0. The dictionary
 ``"package.module"``
     Names in a module. The module sets ``__getattr__ = build_getattr_for_former_names(__name__)``.
 ``"package.module:Class"``
-    Members of a class with the decorator ``add_former_member_names``. If users may override the
-    members in a subclass, the method ``__init_subclass__`` of the class calls
+    Members of a class with the decorator ``add_former_member_names``. If user-defined subclasses
+    may override the members, the ``__init_subclass__`` method of the class calls
     ``copy_former_overrides_to_new_names``.
 ``"package.module:function()"``, ``"package.module:Class()"``
     Keyword arguments of a function or of a constructor. The outermost decorator of the function or
@@ -684,11 +684,12 @@ def translate_former_member_name(owner_class: type, member_name: str) -> str:
 
 
 def copy_former_overrides_to_new_names(subclass: type) -> None:
-    """Add the new names of members that a subclass defines under former names.
+    """Copy members that a subclass defines under former names to their new names.
 
-    If the subclass also defines the new name, the former name is ignored. A dataclass field becomes
-    a property if its new name is a property of the base class. If the new name is not a property of
-    the base class, the dataclass field is unchanged.
+    If the subclass also defines the new name, the former name is ignored. If a dataclass field has
+    a former name, and the base class has a property with the new name, the subclass gets a property
+    with the new name that returns the value of the field. If the base class has no such property,
+    the subclass is not changed for this field.
 
     Parameters
     ----------

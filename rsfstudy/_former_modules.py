@@ -56,7 +56,7 @@ class FormerModuleFinder(MetaPathFinder, Loader):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the specification of a module with a former path.
+        """Return the import specification for the former path of a module.
 
         Parameters
         ----------

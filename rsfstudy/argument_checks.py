@@ -49,8 +49,8 @@ _DESCRIPTION_BY_TYPE: Mapping[Any, str] = {
 def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
     """Reject a ``range`` or a zero-stride array that has too many items.
 
-    Other checks iterate over all items of an argument, which would take too long. The maximum
-    length is ``MAX_ITEMS_OF_LIST_ARGUMENT``.
+    The other checks iterate over all items, so they would take too long for such an argument. The
+    maximum length is ``MAX_ITEMS_OF_LIST_ARGUMENT``.
 
     Parameters
     ----------
@@ -74,9 +74,9 @@ def find_string_instead_of_list_error(
 ) -> InvalidValue | None:
     """Return an error if a string was passed in place of a list of strings.
 
-    A function that expects a list iterates over the characters of the string, so the error that the
-    function raises refers to a single character. If several strings were passed in place of lists,
-    only the first argument is reported.
+    If a function expects a list but receives a string, the function iterates over the characters of
+    the string. The error of the function therefore refers to a single character. If several strings
+    were passed in place of lists, only the first argument is reported.
 
     Parameters
     ----------
@@ -197,13 +197,13 @@ def _find_missing_dimension_in_error(value: Any, error: Exception) -> str | None
 
 
 def _is_substring_of_path(value: object, path: object) -> bool:
-    """Return True if a string or path is contained in another path."""
+    """Return True if a string or path is a substring of another path."""
     is_path = isinstance(value, str | os.PathLike) and isinstance(path, str | os.PathLike)
     return is_path and str(value) in str(path)
 
 
 def _find_missing_name_in_error(error: Exception) -> object:
-    """Return the missing name of a KeyError or AttributeError.
+    """Return the name that a KeyError or AttributeError reports as missing.
 
     The result is None if the exception contains no name.
     """
@@ -467,7 +467,7 @@ def _is_too_long_lazy_sequence(value: Any) -> bool:
 
 
 def _is_encodable_as_utf8(text: str) -> bool:
-    """Return True if UTF-8 can encode a string without null characters."""
+    """Return True if a string can be encoded as UTF-8 and contains no null characters."""
     try:
         return "\0" not in text.encode().decode()
     except UnicodeError:

@@ -1,6 +1,6 @@
 """Default values that the Python functions and the command line share.
 
-The module imports nothing else from the package, so that ``rsfstudy --help`` starts quickly.
+The module imports no other module of the package, so that ``rsfstudy --help`` starts quickly.
 """
 
 from __future__ import annotations

@@ -162,10 +162,10 @@ def _wrap_to_raise_rsfstudy_errors(
     """Wrap a function in the error boundary.
 
     If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
-    stored in files, and the arguments are also checked against their annotations. The arguments are
-    checked after the call, because the errors that the function itself raises are more specific. If
-    the function has the attribute ``convert_arguments``, this callable converts deprecated
-    arguments.
+    stored in files. In this case, the arguments are also checked against their annotations. The
+    check follows the call, because an error that the constructor itself raises is more specific
+    than an error of the check. If the function has a ``convert_arguments`` attribute, the wrapper
+    calls this attribute to convert deprecated arguments.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")
@@ -256,7 +256,7 @@ def _is_internal_module(module_name: str | None) -> bool:
 def _build_failed_call_error(
     callable_name: str, arguments: dict[str, Any], error: Exception
 ) -> RsfStudyError:
-    """Return the error for a failed call if all arguments have valid types."""
+    """Return the error for a call that failed although all arguments have valid types."""
     reason = format_exception(error)
     if any(map(_is_dataset_or_accessor, arguments.values())):
         rule = (

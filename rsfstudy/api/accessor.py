@@ -137,7 +137,7 @@ class DatasetAccessor:
     def study(self) -> Study:
         """Study that produced the dataset.
 
-        The study is always complete, even if the dataset contains only a selection of its cells.
+        The study always contains all cells, even if the dataset contains only some of the cells.
 
         Returns
         -------
@@ -193,7 +193,7 @@ class DatasetAccessor:
 
     @raise_only_rsfstudy_errors
     def in_units(self, *, stress: str = "MPa", length: str = "um", time: str = "s") -> xr.Dataset:
-        """Convert the results of a study with a rig to other units.
+        """Convert the results of a study that uses a rig to other units.
 
         Each cell is converted with the scales of its own rig.
 
@@ -638,7 +638,7 @@ class DatasetAccessor:
             raise DataError(_NOT_AN_RSFSTUDY_DATASET_MESSAGE)
 
     def _require_rsfstudy_dataset_or_table(self) -> None:
-        """Raise ``DataError`` unless the dataset is a table or another dataset of rsfstudy."""
+        """Raise ``DataError`` if the dataset is not a table and was not created by rsfstudy."""
         from rsfstudy.storage import StoredDataset
 
         if not StoredDataset(self._dataset).table_contents:

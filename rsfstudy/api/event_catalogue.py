@@ -100,7 +100,7 @@ def build_event_catalogue(
 def _build_units_and_scale_attributes(
     scale_symbol: str, variable_attributes: Mapping[str, Mapping[Any, Any]]
 ) -> dict[str, str]:
-    """Return the attributes ``units`` and ``scale_symbol`` of an event quantity.
+    """Return the ``units`` and ``scale`` attributes of an event quantity.
 
     Times, slips and stresses have the units of the corresponding variable of the record. The units
     of a slip rate are the units of slip divided by the units of time. All other quantities are
@@ -133,7 +133,7 @@ def events(
 ) -> xr.Dataset:
     """Detect drops of shear stress in a laboratory record.
 
-    A drop is a decrease of shear stress that is too large to be explained by the noise of the
+    A drop is a decrease in shear stress that is too large to be explained by the noise in the
     record.
 
     Parameters
@@ -379,7 +379,7 @@ def _convert_samples_to_finite_array(variable_name: str, values: Any) -> np.ndar
 
 
 def _rename_times_to_displacements(event_catalogue: xr.Dataset) -> xr.Dataset:
-    """Rename ``time`` to ``displacement`` in the catalogue of a record without time."""
+    """Rename the ``time`` variable for a record that contains displacements but no times."""
     words = {
         "time": "displacement at the beginning of the event",
         "duration": "displacement during the event",

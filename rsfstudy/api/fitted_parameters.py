@@ -19,7 +19,7 @@ from rsfstudy.storage import StoredDataset, build_scene_from_stored_fields
 
 
 def _select_single_fit(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the fit of a dataset, or raise ``InvalidValue`` if there are several."""
+    """Return the fit in a dataset, or raise ``InvalidValue`` if there are several fits."""
     found = split_into_single_fits(dataset)
     if len(found) != 1:
         remedy = "Select a fit first, for example dataset.sel(law='slip')."

@@ -67,7 +67,7 @@ class _ReportSectionOfFile:
 
     @property
     def html_anchor(self) -> str:
-        """HTML anchor of the section. The row of the summary links to the anchor."""
+        """HTML anchor of the section, to which the summary row of the file links."""
         return re.sub(r"\W+", "-", self.results_path.name)
 
 

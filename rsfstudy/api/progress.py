@@ -30,7 +30,7 @@ def show_progress(
     item_name: str = "cells",
     delay_seconds: float = 0.0,
 ) -> Iterator[ProgressCallback]:
-    """Show the progress of a run on standard error, or report it to a function.
+    """Show the progress of a run on standard error, or pass the progress to a callback.
 
     Parameters
     ----------

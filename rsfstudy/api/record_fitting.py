@@ -1,7 +1,7 @@
 """Fits of friction parameters to laboratory records.
 
-The main function is ``fit``. The function checks the arguments, builds a study with the measure
-``Fit``, and runs the study.
+The main function, ``fit()``, checks the arguments, builds a study with the measure ``Fit``, and
+runs the study.
 """
 
 from __future__ import annotations
@@ -408,8 +408,8 @@ def _find_initial_stiffness(
 ) -> tuple[float, float, float]:
     """Return the initial stiffness of the fit.
 
-    If the stiffness is in MPa/um, the function returns it as ``machine``. If the stiffness is in
-    1/um, the function returns it as ``ratio``.
+    A stiffness that the user passes in MPa/um is returned as the second value, ``machine``. A
+    stiffness in 1/um is returned as the first value, ``ratio``.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from rsfstudy.study import list_study_names, load_study
 
 
 def parse_output_path(output: str | Path | None) -> Path | None:
-    """Convert the argument ``output`` to a path.
+    """Convert the ``output`` argument to a path.
 
     Parameters
     ----------

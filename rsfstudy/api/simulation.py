@@ -376,9 +376,10 @@ def _convert_recording_to_dataset(
 def build_motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, Any]:
     """Return the attributes of a variable of a motion.
 
-    If the scene has radiation damping, the radiation damping stress at V_* is subtracted from the
-    spring stress, and the long name describes the subtraction. As a result of the subtraction,
-    spring stress and frictional stress are equal at V_*.
+    In a scene with radiation damping, the radiation damping stress at V_* is subtracted from
+    variables that are derived from the spring stress. The long names of these variables mention the
+    subtraction. Because of the subtraction, spring stress and frictional stress are equal in steady
+    sliding at V_*.
 
     Parameters
     ----------
@@ -468,7 +469,10 @@ def _compute_default_duration(scene: Scene) -> float:
 def _check_requested_times(
     times: Any, duration: float | None, start_time: float
 ) -> np.ndarray | None:
-    """Return the requested times as an array of shape (n,), or None."""
+    """Check the requested times, and convert them to an array of shape (n,).
+
+    The result is None if no times are requested.
+    """
     if times is None:
         return None
     if duration is not None:
@@ -503,8 +507,9 @@ def make_row_times_strictly_increasing(recorded_rows: np.ndarray) -> np.ndarray:
     The first row of a regime (form of the equations of motion) has the same time as the last row of
     the previous regime. The first row of a segment of the loading has the same time as the last row
     of the previous segment. If the two rows are equal, the first row is removed. Otherwise, the
-    time of the second row is increased by a few units in the last place. If a rupture is too short
-    for its times to differ in floating-point arithmetic, the times of its rows are also increased.
+    time of the second row is increased by a few units in the last place. Some ruptures are so short
+    that successive times are equal in floating-point arithmetic. These times are increased in the
+    same way.
 
     Parameters
     ----------

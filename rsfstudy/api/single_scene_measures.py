@@ -279,8 +279,9 @@ def _compute_measure_as_dataset(
     """Compute a measure of a scene, and return the outputs as a dataset.
 
     The variables have the same names as in the results of studies. Outputs without a value are NaN.
-    Pass ``is_used_by_other_measure=True`` if another measure uses the results. The function then
-    emits no warnings, and adds its evaluations to the count of the integrator.
+    Pass ``is_used_by_other_measure=True`` if another measure uses the results. In this case, the
+    function emits no warnings, and the right-hand-side evaluations are added to the evaluation
+    count of the integrator.
     """
     check_is_scene(scene)
     check_integrator_is_usable(integrator)

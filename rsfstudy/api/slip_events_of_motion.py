@@ -144,7 +144,7 @@ class InterpolatorBetweenMotionRows:
         self._arrest_slip_rate_level = arrest_slip_rate_level
 
     def find_event_row_spans(self) -> list[tuple[int, int]]:
-        """Return the first and the last row of each event above the threshold.
+        """Return the numbers of the first row and the last row of each event.
 
         Returns
         -------
@@ -211,7 +211,7 @@ class InterpolatorBetweenMotionRows:
         }, cut
 
     def _find_stress_drop_rows(self, first_row: int, last_row: int) -> tuple[int, int]:
-        """Return the rows that contain the stress drop of an event.
+        """Return the two rows between which the stress drop of an event is measured.
 
         If the scene has no noise, the two rows are the local maximum of shear stress before the
         event and the local minimum after the event. Otherwise, the two rows are the nearest rows
@@ -232,7 +232,7 @@ class InterpolatorBetweenMotionRows:
         return highest, lowest
 
     def _build_interpolant_after_row(self, row: int, row_count: int) -> KroghInterpolator:
-        """Interpolate the motion near the interval between a row and the next row.
+        """Build a polynomial that interpolates the motion between a row and the next row.
 
         The interpolating polynomial is a function of the time since the first row of the interval.
         Half of the rows used for the interpolation precede the interval. If the motion has a
@@ -288,7 +288,7 @@ class InterpolatorBetweenMotionRows:
         return many, error + self._is_too_coarse_to_interpolate(sides) * np.array(left)
 
     def _read_time_and_slip_at_end_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the time and slip in the first or last row, with zero errors."""
+        """Return the time and slip of the first or last row, and zeros as their errors."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
     def find_extremum_near_row(

@@ -116,7 +116,7 @@ def read_stress_record(
 
 
 def _find_or_compute_shear_stress(columns: Mapping[str, Column], normal_stress: Any) -> Column:
-    """Return the shear stress, or the product of friction and normal stress in MPa.
+    """Return the shear stress, or compute it in MPa as friction times normal stress.
 
     If the normal stress is unknown, the function returns friction.
     """

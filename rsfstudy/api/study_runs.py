@@ -1,6 +1,6 @@
 """Functions that run studies and process their results.
 
-The main functions are ``run`` and ``open``.
+The main functions are ``run()`` and ``open()``.
 """
 
 from __future__ import annotations
@@ -115,8 +115,8 @@ def run(
 ) -> xr.Dataset:
     """Run a study, and return the results.
 
-    The results are also written to the directory ``output``, together with a journal of finished
-    cells. If a run is interrupted, the next run continues with the remaining cells.
+    The results and a journal of finished cells are also written to the output directory. If a run
+    is interrupted, the next run continues with the remaining cells.
 
     Parameters
     ----------

@@ -372,7 +372,7 @@ class Axis:
 
     @property
     def varies_single_field(self) -> bool:
-        """True if the axis varies a single field, whose name is the dimension name."""
+        """True if the axis varies a single field, after which the dimension is named."""
         return self.labels is None and not self.has_numbered_points
 
     def with_rows(
@@ -416,9 +416,9 @@ class Axis:
     def group_rows_by_scene_parts(self) -> np.ndarray:
         """Assign each row of the axis to a group of similar rows.
 
-        All rows of a group set the same fields. Within a group, the strings and flags of a field
-        are equal, and the numbers of a field are either all zero or all nonzero. Scenes that are
-        built from rows of the same group therefore have the same parts.
+        All rows of a group set the same fields. Within a group, all values of a string or Boolean
+        field are equal, and the values of a numeric field are either all zero or all nonzero.
+        Scenes that are built from rows of the same group therefore have the same parts.
 
         Returns
         -------
@@ -503,7 +503,7 @@ def _build_rows_from_columns(
 
 
 def convert_rows_to_field_columns(rows: Sequence[AxisPointFieldValues]) -> dict[str, list[Any]]:
-    """Convert rows with identical fields to one list of values per field.
+    """Convert rows that set the same fields to a list of values for each field.
 
     Parameters
     ----------

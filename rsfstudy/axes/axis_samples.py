@@ -123,7 +123,7 @@ def _check_sampling_arguments(
 def _compute_stds_and_correlation_matrix(
     distributions: Mapping[str, Any], covariance: Any, method: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the standard deviations and the correlation matrix."""
+    """Compute the standard deviations and correlations of the sampled quantities."""
     count = len(distributions)
     estimates = [
         name for name, drawn in distributions.items() if _is_mean_of_normal_distribution(drawn)
@@ -235,7 +235,10 @@ def _compute_quantiles(
 
 
 def _describe_distribution(distribution: Any) -> Any:
-    """Return a distribution as a string for display, or a mean value as a float."""
+    """Format a distribution as a string for display.
+
+    If a mean value is passed instead of a distribution, the function returns a float.
+    """
     if _is_mean_of_normal_distribution(distribution):
         return float(distribution)
     if not hasattr(distribution, "dist"):

@@ -95,7 +95,7 @@ def _parse_assignments_rejecting_duplicates(
 
 
 def read_loading_if_csv_path(loading_or_path: Any, rig: Rig | None) -> Any:
-    """Read a loading if a value is the path of a CSV file.
+    """If a value is the path of a CSV file, read the loading from this file.
 
     Parameters
     ----------

@@ -81,7 +81,8 @@ class CommandGroup(click.Group):
     def invoke(self, context: click.Context) -> Any:
         """Call a command, and raise ``Interrupted`` after Ctrl-C or a signal.
 
-        If Click handled the interruption, it would print an empty line before its message.
+        Without this method, Click would handle the interruption and would print an empty line
+        before the message.
 
         Parameters
         ----------

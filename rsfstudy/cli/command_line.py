@@ -98,8 +98,8 @@ def _describe_unexpected_error(error: Exception) -> str:
 def _raise_signal_interrupt(signal_number: int, _frame: object) -> None:
     """Raise an interrupt when a signal arrives, and ignore later signals.
 
-    The program ``timeout`` sends two signals. The second signal must not interrupt the cleanup
-    after the first signal.
+    For example, the Unix command ``timeout`` sends two signals, and the second signal must not
+    interrupt the cleanup after the first signal.
     """
     for other in _SIGNALS_THAT_END_COMMAND:
         signal.signal(other, signal.SIG_IGN)
@@ -137,12 +137,12 @@ _MATPLOTLIB_LOG_HANDLER = _WarnOnceHandler(logging.WARNING)
 
 def _print_warning(message: Warning | str) -> None:
     # The console is not used here, because the warning would overwrite a progress bar.
-    """Print a warning to the standard error."""
+    """Print a warning to standard error."""
     print(escape_control_characters(shorten_text(f"warning: {message}", 5000)), file=sys.stderr)
 
 
 def _print_error(text: str) -> None:
-    """Print an error message to the standard error."""
+    """Print an error message to standard error."""
     from rsfstudy.cli.console_output import stderr_console
 
     stderr_console.print(text)

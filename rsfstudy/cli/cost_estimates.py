@@ -96,7 +96,7 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> StudyCos
 
 
 def collect_accuracy_and_cost_fields(cell_plan: CellPlan, output_directory: Path) -> dict[str, Any]:
-    """Return the accuracy of a study and its expected cost as plain data.
+    """Return a dictionary with the accuracy and the expected cost of a study.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Tables of the agreement of two datasets."""
+"""Tables that show how well two datasets agree."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rsfstudy.reporting import TextTable, format_number_or_dash
 
 
 def build_dataset_agreement_table(agreement_by_variable: pd.DataFrame) -> TextTable:
-    """Build a table of the agreement of each variable.
+    """Build a table that shows how well two datasets agree in each variable.
 
     Parameters
     ----------

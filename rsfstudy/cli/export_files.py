@@ -1,7 +1,7 @@
 """Export of results files to CSV and MATLAB.
 
-A new export format needs a function in this module, an entry in the dictionary ``writers`` of
-``commands/export.py``, and an option of the command ``export`` in the same file. The formats in
+To add an export format, write a function in this module. In ``commands/export.py``, add an entry to
+the ``writers`` dictionary and an option to the ``export`` command. The formats in
 ``rsfstudy.defaults.Defaults.RESULT_FORMATS`` are formats of results files, not export formats.
 """
 
@@ -41,9 +41,9 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
 def to_mat(dataset: xr.Dataset, path: Path) -> None:
     """Write all variables of a dataset to a MATLAB file.
 
-    The dimensions of each array keep their order. The MATLAB structure ``units`` contains the units
-    of each variable. The structure ``dimensions`` contains the dimension names of each variable.
-    The structure ``attributes`` contains the attributes of the dataset.
+    The dimensions of each array keep their order. The MATLAB file also contains three structures:
+    ``units`` and ``dimensions`` (the units and the dimension names of each variable) and
+    ``attributes`` (the attributes of the dataset).
 
     Parameters
     ----------

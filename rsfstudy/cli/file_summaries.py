@@ -24,7 +24,7 @@ from rsfstudy.status import Status
 
 @dataclass(frozen=True)
 class FileSummary(CommandResult):
-    """Dataset in a file, prepared for display by the command ``show``.
+    """Dataset in a file, prepared for display by the ``show`` command.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ NAMES_OF_RECORD_OPTIONS = ("columns", "normal_stress", "rows", *_OPTIONS_PASSED_
 def _parse_number_or_text(
     _context: click.Context, _option: click.Parameter, text: str | None
 ) -> Any:
-    """Convert the value of an option to a number if it has no units."""
+    """Convert the value of an option to a number if the value has no units."""
     from rsfstudy.cli.assignment_parsing import parse_number_or_text
 
     return None if text is None else parse_number_or_text(text)

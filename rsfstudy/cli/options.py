@@ -28,7 +28,7 @@ DecoratedFunction = TypeVar("DecoratedFunction", bound=Callable[..., Any])
 
 
 class CommandOptions(SimpleNamespace):
-    """Arguments and options of one command call, as attributes."""
+    """Arguments and options of a command call, which can be read as attributes."""
 
     variable: str | None = None
     engine: Any = None

@@ -1,4 +1,4 @@
-"""Checks before the commands ``simulate`` and ``fit`` overwrite data files."""
+"""Checks that the ``simulate`` and ``fit`` commands make before they overwrite data files."""
 
 from __future__ import annotations
 

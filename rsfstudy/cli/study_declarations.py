@@ -23,7 +23,7 @@ _MAX_PRINTED_AXIS_POINTS = 40
 
 @dataclass(frozen=True)
 class StudyDeclaration(CommandResult):
-    """Declaration of a study, prepared for display by the command ``show``.
+    """Declaration of a study, prepared for display by the ``show`` command.
 
     Parameters
     ----------

@@ -216,8 +216,8 @@ class CriticalPath(NamedTuple):
         """Yield the events of the path, starting at the tangency point.
 
         The integration ends early if the path cannot continue, or if the path exceeds its budget of
-        right-hand-side evaluations. The budget increases with decreasing tolerance, in proportion
-        to the cost of an integrator of order eight.
+        right-hand-side evaluations. For smaller tolerances, the budget increases in proportion to
+        the number of steps that an eighth-order integrator requires.
         """
         start = self.tangency_point_at_instability_norm
         if start is None:
@@ -294,8 +294,7 @@ class CriticalPath(NamedTuple):
     def next_peak_exceeds_instability_norm(self, local_tolerance: float) -> bool:
         """Return True if the next peak of ln V exceeds the instability norm.
 
-        If the next peak of ln V exceeds the instability norm, other motions may reach the norm at
-        their second peak.
+        In this case, the second peak of other motions may also reach the instability norm.
 
         Parameters
         ----------
@@ -367,8 +366,8 @@ def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Numer
 
     The function ``(x, weakest, p) -> (g, Psi)`` returns the frictional stress g and the state Psi
     at which the time derivative of ln V is zero. The argument ``x`` is ln(V/V_*). The results are
-    NaN if ln V is never stationary at this slip rate. The argument ``weakest`` is a lower bound of
-    the frictional stress.
+    NaN if ln V is never stationary at this slip rate. The argument ``weakest`` is a lower bound on
+    the frictional stress ``g``.
 
     Notes
     -----

@@ -56,8 +56,9 @@ def find_critical_step_size_by_critical_path(
 ) -> CriticalStepSizeEstimate | None:
     """Find the critical step size from the critical path.
 
-    The boundary is rejected if smaller steps may be unstable, which is the case if steady sliding
-    is unstable, or if the next peak of ln V exceeds the instability norm.
+    The boundary is rejected if smaller steps may be unstable. Smaller steps may be unstable if
+    steady sliding is unstable after a smaller step, or if the next peak of ln V exceeds the
+    instability norm.
 
     Parameters
     ----------
@@ -96,8 +97,8 @@ def find_critical_step_size_by_limit_cycle(
 ) -> CriticalStepSizeEstimate | None:
     """Find the step size at which a limit cycle touches the instability norm.
 
-    The search requires that larger steps make steady sliding less stable, and that steady sliding
-    is unstable after the largest step.
+    The function searches for a boundary only if steady sliding is less stable after larger steps
+    and unstable after the largest step.
 
     Parameters
     ----------

@@ -98,10 +98,10 @@ def _build_outputs_for_stepped_field(stepped_field_name: str) -> tuple[Output, .
 class CriticalStep(Measure):
     r"""Smallest step after which the slip rate reaches the instability norm.
 
-    Depending on the argument ``of``, the critical step is a velocity ratio, a displacement (in
-    units of D_c), or a change in normal stress (in units of sigma_*). The outputs include the sizes
-    of two steps that confirm the critical step. The slider settles after the smaller step, and
-    becomes unstable after the larger step.
+    The critical step is a velocity ratio, a displacement (in units of D_c), or a change in normal
+    stress (in units of sigma_*). The parameter ``of`` selects the type of the step. The outputs
+    include the sizes of two steps that confirm the critical step. The slider settles after the
+    smaller step, and becomes unstable after the larger step.
 
     Parameters
     ----------
@@ -300,13 +300,13 @@ class CriticalStep(Measure):
     ) -> Outcome:
         """Confirm a critical step with motions after a smaller and a larger step.
 
-        The two step sizes differ from the critical step size by the error of the critical step
-        size. If the motions after the two steps do not confirm the critical step, the relative
-        difference between the two step sizes and the critical step size is increased tenfold, up to
-        2 %. The reported error of the critical step size is the smallest difference at which the
-        motions confirm the critical step. A critical step that was computed from a critical path is
-        rejected if the motions do not confirm it at the initial difference. In this case, a smaller
-        step may be critical, because oscillations below the instability norm may grow.
+        The initial difference between the two step sizes and the critical step size is based on the
+        estimated error of the critical step size. If the motions after the two steps do not confirm
+        the critical step, the relative difference is increased tenfold, up to 2 %. The reported
+        error is then the smallest difference at which the motions confirm the critical step.
+        However, if the critical step was computed from a critical path, the difference is not
+        increased, and an unconfirmed critical step is rejected. In this case, a smaller step may be
+        critical, because oscillations below the instability norm may grow.
         """
         first = (
             step_size_estimate.relative_error
@@ -556,9 +556,10 @@ def _make_outcome_of_neutral_stability(tolerance: float) -> Outcome:
 def _compute_massless_critical_step_size(
     step_family: LoadingStepFamily, integrator: Integrator
 ) -> float | None:
-    """Compute the critical step for an instability norm with negligible inertia.
+    """Compute the critical step size of the same slider without inertia.
 
-    The estimate requires few evaluations. The result is None if there is no critical path.
+    The instability norm is limited to a value at which inertia has little effect. The computation
+    requires few evaluations. The result is None if there is no critical path.
     """
     norm = min(step_family.scene.instability_norm, _SLIP_RATE_NORM_OF_NEGLIGIBLE_INERTIA)
     massless = type(step_family)(

@@ -73,8 +73,8 @@ def build_slow_instability_norm_warning(scene: Scene, load_velocity: float) -> s
 
     The instability norm is considered slow if the corresponding slip rate is less than a thousand
     times the load point velocity. A motion may reach such a slip rate without an instability. If
-    the scene has the default reference rate, there is no warning, because the scene then represents
-    a published study rather than a laboratory apparatus.
+    the scene has the default reference rate, the function returns no warning. Such a scene is
+    assumed to represent a published study rather than a laboratory apparatus.
 
     Parameters
     ----------

@@ -136,9 +136,9 @@ class LoadingStepFamily:
     def compute_step_size_tolerance(self, step_size: float, field_value_tolerance: float) -> float:
         r"""Convert a tolerance of the step value to a tolerance of the step size.
 
-        A relative error of the step size that equals the returned tolerance causes a relative error
-        ``field_value_tolerance`` in the change of the step value. The size tolerance is at most
-        ``field_value_tolerance``.
+        If the relative error of the step size is within the returned tolerance, the relative error
+        of the change in the step value is within ``field_value_tolerance``. The size tolerance is
+        at most ``field_value_tolerance``.
 
         Parameters
         ----------
@@ -407,7 +407,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
     def _find_misfit_root_at_loose_tolerance(
         self, build_critical_path: Callable[[float], CriticalPath], integrator: Integrator
     ) -> tuple[float, float] | None:
-        """Return the root ln(step size) of the misfit, and the slope of the misfit.
+        """Return the log step size at which the misfit is zero, and the slope of the misfit.
 
         The misfit is computed with a loose tolerance. The result is None if there is no root.
         """
@@ -495,7 +495,7 @@ class LoadingStepFamilySolvedByShooting(LoadingStepFamily):
 def _find_misfit_root(
     misfit_function: Callable[[float], float], known_misfits: Mapping[float, float], *bracket: float
 ) -> tuple[float, float] | None:
-    """Find the root ln(step size) of a misfit, and the slope of the misfit.
+    """Find the log step size at which a misfit is zero, and the slope of the misfit.
 
     If there is no critical path, only the sign of the misfit is known. The root and the slope are
     computed from misfits whose magnitude is known. The result is None if too few misfits have a

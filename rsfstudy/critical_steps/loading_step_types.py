@@ -157,9 +157,10 @@ class DisplacementStepFamily(LoadingStepFamily):
         """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the slider follows the critical path with a delay, which changes
-        the critical step size in two ways. The load point moves during the delay, and the state
-        evolves less because the slip rate is lower. The effect on the state is b/2 times the slip
-        by which the slider is delayed. See ``LoadingStepFamily.inertia_shifts_critical_step_size``.
+        the critical step size in two ways. First, the load point moves during the delay. Second,
+        the state evolves less because the slip rate is lower. The resulting difference in the state
+        is b/2 times the slip by which the slider lags behind. See
+        ``LoadingStepFamily.inertia_shifts_critical_step_size``.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -340,9 +341,9 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
     def _guess_critical_step_size(self) -> float:
         """Return a guess of the critical step size.
 
-        For a decrease in normal stress, the guess is the change in Coulomb stress that reaches the
-        threshold of the slip law. For an increase in normal stress, the guess is the step after
-        which steady sliding becomes unstable.
+        For an increase in normal stress from stable sliding, the guess is the step after which
+        steady sliding becomes unstable. Otherwise, the guess is the step whose change in Coulomb
+        stress equals the instability threshold of the slip law.
         """
         scene, law = self.scene, self.scene.parts.law
         if self.sign > 0 and 1.0 < scene.stiffness_ratio < math.inf:
@@ -371,9 +372,9 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
 
         The largest step raises the slip rate to the instability norm immediately. With inertia, the
         range of step sizes is extended, because the slip rate rises with a delay while stress
-        relaxes. An increase in normal stress raises the slip rate only if its effect on the state
-        exceeds its effect on friction. If the load point moves, the search is limited to steps
-        after which sliding can be steady.
+        relaxes. An increase in normal stress strengthens friction directly and weakens friction by
+        changing the state. The slip rate rises only if the weakening is the larger effect. If the
+        load point moves, the search is limited to steps after which sliding can be steady.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_slip_rate_at_instability:
@@ -405,8 +406,8 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         """Return the largest step size after which the normal stress is positive.
 
         If normal stress depends on shear stress, sigma_3 must remain positive after a decrease in
-        normal stress. If sigma_3 were negative, friction would decrease faster with slip than the
-        spring stress decreases, at any slip rate.
+        normal stress. If sigma_3 were negative, friction would decrease faster than the spring
+        stress as the slider slips, at any slip rate.
         """
         follows, _alpha = self.scene.parts.normal_stress.coupling or (0.0, 0.0)
         if self.sign > 0 or not follows:

@@ -1,15 +1,16 @@
 """Monotonic rise of the slip rate to a fast load point velocity.
 
 If seismic waves radiate most of the stress, the slip rate V rises gradually. The slip during this
-rise is eta V_0/(K D_c), which is many times D_c. During the rise of the slip rate, the state stays
-close to its steady state. An explicit integrator would need steps of about D_c during the whole
-rise of the slip rate. The functions of this module test whether the slip rate rises monotonically
-to the load point velocity. If the rise is monotonic, the integration ends early.
+rise is eta V_0/k, which is many times D_c. During the rise of the slip rate, the state stays close
+to its steady state. An explicit integrator would need steps of about D_c during the whole rise of
+the slip rate. The functions of this module test whether the slip rate rises monotonically to the
+load point velocity. If the rise is monotonic, the integration ends early.
 
 The test uses two curves in the plane of ln V and state. The two curves meet only at the point of
 steady sliding. The first curve is the steady state as a function of ln V. On the second curve, the
-state lags behind its steady state, and motions can cross this curve only in the direction of
-smaller lags. A motion between the two curves remains between the curves, and its slip rate rises.
+state lags behind its steady state. Motions can cross the second curve only in one direction,
+towards smaller lags. A motion between the two curves remains between the curves, and its slip rate
+rises.
 """
 
 from __future__ import annotations

@@ -162,8 +162,9 @@ def _compute_max_log_rate_of_closed_orbit(scene: Scene, integrator: Integrator) 
 
     The largest ln V on the orbit is the last maximum before the start of the motion, or the first
     maximum after the start. If the motion starts with a decreasing slip rate, the motion is
-    integrated backwards in time to the previous peak. The rest of the orbit may reach slip rates of
-    1e-40 V_*, at which an integration would lose all digits.
+    integrated backwards in time to the previous peak. The rest of the orbit is not integrated,
+    because its slip rates may be as low as 1e-40 V_*, at which an integration would lose all
+    digits.
     """
     begin = Integrator.compute_initial_point(scene)
     equations, start = (
@@ -208,8 +209,8 @@ def _slow_orbit_grows_to_instability_norm(
     """Return True if a slowly growing orbit grows up to the instability norm.
 
     The function tests successively larger orbits, until an orbit shrinks or reaches the instability
-    norm. If the first peak of ln V on the next orbit is above the instability norm, the size of the
-    next orbit is reduced.
+    norm. If an orbit already reaches the instability norm at its first peak of ln V, the function
+    tests a smaller orbit instead.
     """
     if not with_inertia and _does_orbit_at_instability_norm_shrink(scene, integrator):
         return False

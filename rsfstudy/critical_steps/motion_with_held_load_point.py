@@ -133,9 +133,8 @@ def _slip_rate_stays_below_instability_norm(scene: Scene, motion_point: MotionPo
     as ln V decreases, so the state continues to strengthen friction.
 
     The loss of strength due to pore pressure and heat, divided by a, is an upper bound on the
-    increase in ln V due to these two effects. The function returns True if, even with ln V
-    increased by this bound, the states weaken friction more slowly than the spring stress
-    decreases.
+    increase in ln V due to these two effects. The function increases ln V by this upper bound, and
+    returns True if the states still weaken friction more slowly than the spring stress decreases.
     """
     _value, slope, shift, shift_slope = scene.build_friction_relation(motion_point.psis)(
         motion_point.frictional_stress
@@ -167,8 +166,10 @@ def _compute_max_rate_rise_by_pore_pressure(
 
     The function returns the upper bound, and the smallest decrease in the state due to stress and
     temperature. The upper bound is infinite if no bound is found. To find the bound, the function
-    tests trial increases in ln V. A trial increase is an upper bound if the highest pore pressure
-    and temperature at the increased ln V reduce strength by less than a times the trial increase.
+    tests trial increases in ln V. For each trial increase, the function computes the loss of
+    strength at the highest pore pressure and temperature that are possible at the increased ln V.
+    The trial increase is an upper bound if the loss of strength is less than a times the trial
+    increase.
     """
     value, _slope, shift, _ = scene.build_friction_relation(motion_point.psis)(
         motion_point.frictional_stress
@@ -191,9 +192,10 @@ def _compute_max_rate_rise_by_pore_pressure(
 def _find_pressure_and_temperature_bounds(
     scene: Scene, motion_point: MotionPoint, log_slip_rate: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the states at the highest pore pressure and the temperature limits.
+    """Return the states at the highest and at the lowest possible temperature.
 
-    The bounds are valid as long as the slip rate does not exceed ``log_slip_rate``.
+    Both results contain the highest possible pore pressure. The bounds are valid as long as
+    ln(V/V_*) does not exceed ``log_slip_rate``.
     """
     fluid, temperature = scene.parts.fluid, scene.parts.temperature
     hottest, coldest, range_of_rise = list(motion_point.psis), list(motion_point.psis), 0.0

@@ -29,9 +29,9 @@ class Triggered(Measure):
     the motion never reaches the norm. The motion is integrated until the value of the flag is
     certain. To find the smallest step that triggers an instability, use ``CriticalStep``.
 
-    The status is ``unverified`` if the flag has a different value when the tolerances are ten times
-    smaller, or if the relative difference between the stiffness and the critical stiffness is less
-    than ten times the requested accuracy.
+    The status is ``unverified`` if the value of the flag changes when the tolerances are reduced
+    tenfold. The status is also ``unverified`` if the stiffness is too close to the critical
+    stiffness, that is, if the relative difference is less than ten times the requested accuracy.
 
     Notes
     -----

@@ -146,8 +146,8 @@ def serialize_cell_settings(cell_settings: SharedCellSettings) -> bytes:
     """Serialise the settings of the cells for the workers.
 
     The result includes the code that workers cannot import. The result also includes the code of
-    the modules of named studies. If a worker imported these modules instead,
-    it would load all modules that are needed to declare and reduce studies.
+    the modules of named studies. If workers imported these modules instead, all modules that are
+    needed to declare and reduce studies would also be loaded.
 
     Parameters
     ----------
@@ -350,9 +350,9 @@ class _CpuTimeLimits:
 
     The operating system measures the CPU time of the whole process. The limit is therefore
     multiplied by the number of computing threads. The limit is set once per batch instead of once
-    per cell. Setting the limit once is sufficient, because a batch starts no further cells once
-    ``_SECONDS_BETWEEN_JOURNAL_TRANSFERS`` has passed. Only the last cell of a batch can therefore
-    run for a long time.
+    per cell. Setting the limit once is sufficient, because no further cell of the batch is started
+    after ``_SECONDS_BETWEEN_JOURNAL_TRANSFERS`` seconds. Only the last cell of a batch can
+    therefore run for a long time.
     """
 
     def __init__(self) -> None:

@@ -53,10 +53,10 @@ class CheckCommandResult(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Exit status of the command ``check``.
+        """Exit status of the ``check`` command.
 
-        The status is 1 if a verdict changed, if a cell failed or has not been computed, or if a
-        study or a claim was not checked.
+        The status is 1 if a verdict differs from the expected verdict, if a cell failed or has not
+        been computed, or if a study or a claim was not checked.
         """
         changed = self.claim_verdicts is not None and bool(
             self.claim_verdicts["verdict_changed"].any()

@@ -206,7 +206,7 @@ def _build_differing_statuses_table(differing_statuses: pd.DataFrame) -> TextTab
 
 
 def _select_rows_with_differences(agreement_table: pd.DataFrame) -> pd.DataFrame:
-    """Select the rows with different values or with error estimates."""
+    """Select the rows of results that differ or that have error estimates."""
     from rsfstudy.vocabulary import find_coverage_content_type
 
     differs = agreement_table["identical"] < agreement_table["values"]

@@ -63,7 +63,7 @@ class FitCommandResult(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Exit status. The status is 1 if a fit has no values or no valid errors."""
+        """Exit status. The status is 1 if a fit has no values or if its errors are not valid."""
         from rsfstudy.reporting import are_all_fits_valid
 
         return EXIT_STATUS_OK if are_all_fits_valid(self.fit_dataset) else EXIT_STATUS_FAILED
@@ -322,7 +322,10 @@ def _print_loading_steps(record: Record) -> None:
 def _format_normal_stresses_of_step(
     loading_step: LoadingStep, include_stresses: bool
 ) -> dict[str, str]:
-    """Format the normal stresses of a step in MPa, if the table shows them."""
+    """Format the normal stresses before and after a step in MPa.
+
+    The dictionary is empty if ``include_stresses`` is False.
+    """
     stresses = {
         "sigma0 (MPa)": loading_step.stress_before,
         "sigma1 (MPa)": loading_step.stress_after,

@@ -41,9 +41,10 @@ def plot(command_options: options.CommandOptions) -> int:
     """Draw the figure of a study, a motion or a record.
 
     NAME is the name of a study, or a file that contains results, a motion, a table of holds or a
-    laboratory record. Records are read with the options of the command ``fit``. By default, the
-    command writes the figure to the directory of the file. If the study defines its own figure,
-    pass the Python file of the study with --study. The Python file is executed.
+    laboratory record. To specify how a record is read, use the same options as for the ``fit``
+    command. By default, the command writes the figure to the directory of the file. If the study
+    defines its own figure, pass the Python file of the study with --study. The Python file is
+    executed.
     """
     from rsfstudy.api import find_results_file
     from rsfstudy.cli.figure_files import build_default_figure_path
@@ -72,7 +73,10 @@ def plot(command_options: options.CommandOptions) -> int:
 
 
 def _is_file_of_record(name: str | None) -> bool:
-    """Return True if a name is the path of a file other than results or a study."""
+    """Return True if a name is the path of a file that may be a laboratory record.
+
+    Results files, Python files and the names of studies are excluded.
+    """
     if name is None or Path(name).suffix in (".nc", ".zarr", ".py") or not Path(name).is_file():
         return False
     return name not in list_study_names()

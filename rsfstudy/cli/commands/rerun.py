@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 )
 @options.worker_pool_options
 def rerun(command_options: options.CommandOptions) -> int:
-    """Recompute the results in a file, and compare both results.
+    """Recompute the results in a file, and compare them with the stored results.
 
     The command rebuilds the study from the results file. The exit status is 1 if a recomputed
     number differs from the number in the file.
@@ -69,7 +69,7 @@ def _are_all_values_identical(agreement_by_variable: pd.DataFrame) -> bool:
 
 
 def _print_agreement_with_file(agreement_by_variable: pd.DataFrame) -> None:
-    """Print the agreement of the recomputed results with the results file."""
+    """Print how well the recomputed results agree with the results file."""
     from rsfstudy.cli.dataset_agreement_tables import build_dataset_agreement_table
 
     for name, (in_file, now) in agreement_by_variable.attrs["differs"].items():

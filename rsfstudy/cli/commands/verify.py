@@ -166,10 +166,10 @@ def _print_verification(result: VerifyCommandResult) -> None:
 def _write_agreement_figure(
     answer_comparisons: Sequence[AnswerComparison], command_options: options.CommandOptions
 ) -> None:
-    """Draw the number of agreeing digits of each quantity.
+    """Plot the number of correct digits of each quantity.
 
-    For a single file whose problem has an index column, such as time, the figure shows the digits
-    against this column. Otherwise, the figure shows the digits against the problem number.
+    For a single file whose problem has an index column, such as time, the digits are plotted
+    against this column. Otherwise, the digits are plotted against the problem number.
     """
     import numpy as np
 
