@@ -121,20 +121,21 @@ class Bifurcation(Measure):
     """Peak slip rates of successive events at a constant load point velocity.
 
     The measure discards a transient and then records the peak slip rate of each event. The measure
-    also searches for the period-one cycle. The search starts from events that almost repeat the
-    preceding event. The period-one cycle is reported even if neighbouring motions diverge from it.
-    The Floquet multipliers of this cycle are the eigenvalues of the derivative of the return map,
-    which maps spring stress and states from one maximum of spring stress to the next. The period of
-    the cycle doubles when a multiplier passes through -1.
+    also searches for the period-one cycle. The search starts from events at which the state of the
+    slider is almost the same as at the preceding event. The period-one cycle is reported even if
+    neighbouring motions diverge from it. The Floquet multipliers of this cycle are the eigenvalues
+    of the derivative of the return map, which maps spring stress and states from one maximum of
+    spring stress to the next. The period of the cycle doubles when a multiplier passes through -1.
 
     A period is reported only if the motion approaches an attracting cycle, and if this cycle closes
     to the requested accuracy. If no period is reported, the status is ``not_periodic``. In this
     case, the Lyapunov exponent is the mean growth rate of small perturbations over the recorded
     events, and its standard error is also computed. If the motion approaches a cycle, the Lyapunov
-    exponent is the logarithm of the absolute value of the largest multiplier divided by the period,
-    and no standard error is computed. The peaks of a chaotic motion have no error estimate, because
-    a more accurate integration does not reproduce the peaks. The number of events per period is an
-    integer, so its error is zero.
+    exponent is computed from the largest multiplier: the logarithm of the absolute value of the
+    multiplier is divided by the number of events per period. In this case, no standard error is
+    computed. The peaks of a chaotic motion have no error estimate, because a more accurate
+    integration does not reproduce the peaks. The number of events per period is an integer, so its
+    error is zero.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ class Bifurcation(Measure):
 
     @property
     def output_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Coordinate values of the dimension ``event``."""
+        """Coordinate values along the ``event`` dimension."""
         return {"event": np.arange(1, self.events + 1)}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
@@ -361,9 +362,9 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[StickSlipCycle]) -> Peri
 
 
 def _closest_returns(seen: Sequence[StickSlipCycle]) -> list[StickSlipCycle]:
-    """Return the cycles that almost repeat, in order of increasing mismatch.
+    """Return the cycles that almost close, in order of increasing mismatch.
 
-    Cycles in the first half of the motion are ignored. A cycle almost repeats if the states at its
+    Cycles in the first half of the motion are ignored. A cycle almost closes if the states at its
     end are close to the states at its beginning. The cycles are sorted by the largest change of a
     state over the cycle, relative to the range of ln V.
     """

@@ -24,7 +24,7 @@ _RESULT_DESCRIPTIONS = {
 
 @dataclass(frozen=True)
 class CheapestIntegrator(Reduction):
-    """Integrator that reaches a number of correct digits with the least work.
+    """Integrator that reaches a given number of correct digits with the least work.
 
     The work is the number of right-hand-side evaluations. This number is interpolated
     logarithmically between neighbouring runs of the same integrator. Failed runs are ignored.
@@ -52,7 +52,7 @@ class CheapestIntegrator(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Quantities of the results and of the dimension ``digits``."""
+        """Quantities that describe the results and the ``digits`` dimension."""
         digits = Quantity("digits", "", "1", "required number of correct decimal digits")
         return digits, *(
             Quantity(f"{self.name}_{n}", "", *about) for n, about in _RESULT_DESCRIPTIONS.items()
@@ -110,7 +110,7 @@ class CheapestIntegrator(Reduction):
 
 
 def _values_at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Interpolate values to the numbers of correct digits.
+    """Interpolate the values of the runs to given numbers of correct digits.
 
     Parameters
     ----------

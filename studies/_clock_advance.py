@@ -1,8 +1,8 @@
-"""Clock advance of the next stick-slip event by a train of waves.
+"""Clock advance of the next stick-slip event due to a train of waves.
 
 The measure ``ClockAdvance`` computes the clock advance from motions with and without the waves. The
 measure also computes two approximations of the clock advance. One approximation uses first-order
-perturbation theory, and the other uses a threshold of Coulomb stress.
+perturbation theory, and the other uses a Coulomb stress threshold.
 """
 
 import math
@@ -87,7 +87,7 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class ClockAdvance(Measure):
-    """Clock advance of the next stick-slip event by a train of waves.
+    """Clock advance of the next stick-slip event due to a train of waves.
 
     The clock advance is the time by which the waves advance the next event. An event occurs when
     the slip rate reaches the instability norm. The parameter ``cycle_phase`` determines the time at
@@ -315,9 +315,9 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrato
         \dot{\delta\Psi} &= -e^{-\Psi/b}\,\delta\Psi - b V\,\delta x
         \quad \text{(slowness law)},
 
-    with :math:`x = \ln(V/V_*)`. During nucleation, the perturbed motion converges to the original
-    motion, which is shifted in time by the clock advance :math:`\Delta t`, so that :math:`\delta x
-    = \Delta t\,\dot x`.
+    with :math:`x = \ln(V/V_*)`. During nucleation, the perturbed motion becomes a copy of the
+    original motion, shifted in time by the clock advance :math:`\Delta t`. Therefore, :math:`\delta
+    x = \Delta t\,\dot x`.
 
     Parameters
     ----------
@@ -380,7 +380,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrato
         return along(t, y, train(t) / amplitude)[-1]
 
     def fast(t: float, y: np.ndarray) -> float:
-        """Return a value that is zero when the event is imminent."""
+        """Return ln V minus the value at which the event is imminent."""
         return float((y[0] - y[1]) / a - NEGLIGIBLE_TIME_LOG_RATE)
 
     setattr(fast, "terminal", True)  # noqa: B010  # attribute required by SciPy
@@ -403,7 +403,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrato
 
 
 def _coulomb_clock_advance(scene: Scene, found: _NextEvent) -> float:
-    r"""Compute the clock advance that a threshold of Coulomb stress predicts.
+    r"""Compute the clock advance that a Coulomb stress threshold predicts.
 
     The load point stresses the spring at the rate :math:`K V_0`. In the motion without waves, the
     onset of the event is at the time :math:`t_1`, and the friction coefficient at the onset is

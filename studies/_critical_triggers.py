@@ -26,7 +26,7 @@ TRIGGERS = (_NORMAL_STRESS_FALL, _DISPLACEMENT_STEP, _VELOCITY_STEP)
 
 
 def _trigger_outputs(trigger: CriticalStep) -> tuple[Output, ...]:
-    """Return the outputs of a critical step."""
+    """Return the outputs that describe the search for a critical step."""
     of = trigger.primary_output
     ended = f"status of the search for the critical {trigger.of}, as a flag value"
     return (
@@ -99,14 +99,14 @@ class Triggers(Measure):
 
     The results include the critical steps and the corresponding stress changes. Decreases of normal
     stress and displacement steps are converted to changes of Coulomb stress. Velocity steps are
-    converted to the stress change that corresponds to the direct effect.
+    converted to the stress change of the direct effect.
 
     After a decrease of normal stress or a displacement step, the load point does not move, unless
     the scene specifies ``load_velocity_ratio``. The search for each critical step has a separate
     work budget and a separate status. If a critical step does not exist, the message explains the
-    reason. If a search fails, the outcome has the status of the first failed search. If all
-    searches succeed, the outcome is successful only if a critical decrease of normal stress and a
-    critical displacement step exist. A critical velocity step need not exist.
+    reason. If a search fails, the outcome has the status of the first failed search. If no search
+    fails, the outcome is successful if both a critical decrease of normal stress and a critical
+    displacement step exist. A critical velocity step is not required.
     """
 
     name: ClassVar[str] = "triggers"
@@ -117,7 +117,7 @@ class Triggers(Measure):
 
     @property
     def relative_cost_by_digits(self) -> Mapping[float, float]:
-        """Relative number of right-hand-side evaluations for each requested accuracy."""
+        """Relative cost of the computation for each requested number of digits."""
         return _NORMAL_STRESS_FALL.relative_cost_by_digits
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:

@@ -7,10 +7,11 @@ short recurrence intervals alternate. The coefficient of variation (CV) of the i
 difference of the two intervals divided by their sum. At all other normal stresses of the
 experiments, all intervals are equal.
 
-The stochastic model of the paper adds white noise to shear stress and to effective normal stress
-at constant slip rate, so the noise also acts on the state variable. Scenes of rsfstudy in which the
-stress has noise differ from this stochastic model, because their slip rate responds to the noise
-immediately.
+The stochastic model of the paper adds white noise to shear stress and to effective normal stress,
+and does not change the slip rate immediately. At a given slip rate, a change of stress is a change
+of the state variable. The noise therefore also acts on the state variable. In scenes of rsfstudy
+with noise in the stress, the slip rate responds to the noise immediately. These scenes therefore
+differ from the stochastic model of the paper.
 
 Gualandi et al. denote the unknowns by :math:`x = \ln(V/V_0)`, :math:`y = (\tau - \mu_0 \sigma)/(a
 \sigma)`, :math:`z = (\varphi - \varphi_0)/(\lambda \beta \sigma)` and :math:`u = -p/(\lambda

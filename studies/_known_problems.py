@@ -172,9 +172,9 @@ class ProblemMeasure(Measure):
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Return the problems that a description contains.
+        """Build the problems that are listed in the description of a measure.
 
-        The ``problems`` entry is removed from the description.
+        The problems are removed from the description.
 
         Parameters
         ----------

@@ -169,7 +169,7 @@ class NoiseKind:
     def _times(self, truth: ExactResponse, rng: np.random.Generator, margin: int) -> np.ndarray:
         """Return the sample times.
 
-        The argument ``margin`` is the number of additional rows at each end. These rows are needed
+        The ``margin`` argument is the number of additional rows at each end. These rows are needed
         because the running mean shortens the record.
         """
         slow, fast = (1.0 / rate for rate in self.rate)

@@ -157,7 +157,7 @@ class _ResponseRecord(NamedTuple):
 
     @property
     def aliasing(self) -> float:
-        """Estimated change of the norm of all overtones due to aliasing.
+        """Estimated error in the norm of the overtones due to aliasing.
 
         Let :math:`D` be the norm of the resolved overtones, and :math:`B` the norm of the upper
         quarter of these overtones. The unresolved overtones are assumed to have the norm :math:`B`
@@ -183,10 +183,11 @@ class _ResponseRecord(NamedTuple):
         return complex(ours / imposed)
 
     def equals_in_median(self, other: _ResponseRecord) -> bool:
-        """Return True if two records of spring stress agree in the median.
+        """Return True if the median difference between two records is small.
 
-        The comparison uses the median difference instead of the maximum, because a sudden change of
-        spring stress may occur one sample earlier or later.
+        The comparison uses the median difference in spring stress instead of the maximum
+        difference. A sudden change of spring stress may occur one sample earlier or later, and the
+        difference is then large at this sample.
 
         Parameters
         ----------
@@ -231,7 +232,7 @@ class NormalStressResponse(RecordingMeasure):
 
     The response to strong oscillations may repeat only after 2, 3 or 4 forcing periods. The result
     ``response_period`` reports the number of forcing periods, and all other results refer to a
-    complete response period. The result ``settled`` is 1 if the two records agree to 0.1 % of the
+    complete response period. The value of ``settled`` is 1 if the two records agree to 0.1 % of the
     range of spring stress. If the response does not repeat within 4 forcing periods, the status is
     ``not_periodic``. If steady sliding is unstable, transients do not decay, and the status is
     ``not_applicable``.
@@ -263,15 +264,15 @@ class NormalStressResponse(RecordingMeasure):
 
     @property
     def recorded_point_count(self) -> int:
-        """Number of samples of the record along ``phase``."""
+        """Number of recorded samples along the ``phase`` dimension."""
         return self.samples + 1
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scales of the numerical errors.
 
-        The scale of the gain is the gain plus the ratio of the direct effect ``a`` to the amplitude
-        of normal stress. The result ``distortion`` has no scale, because its accuracy depends on
-        the option ``samples``.
+        The scale of the gain is ``gain + a / amplitude``, where ``a`` is the parameter of the
+        direct effect and ``amplitude`` is the amplitude of normal stress. The distortion has no
+        scale, because its accuracy depends on the number of samples.
 
         Parameters
         ----------
@@ -369,9 +370,9 @@ class NormalStressResponse(RecordingMeasure):
     ) -> tuple[MotionPoint, int]:
         """Find the number of forcing periods after which the response repeats.
 
-        The motion is first integrated over ``waits`` forcing periods. The search for the period is
-        repeated several times, because the transients of strong oscillations may decay more slowly
-        than small perturbations.
+        The motion is first integrated over a given number of forcing periods (``waits``). The
+        search for the period is repeated several times, because the transients of strong
+        oscillations may decay more slowly than small perturbations.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Transient of friction after a step of normal stress at a moving load point.
+"""Transient of friction after a step in normal stress while the load point moves.
 
 The evaluation follows Linker and Dieterich (1992).
 """
@@ -106,7 +106,7 @@ class _TransientRecord(NamedTuple):
         return float(MotionRecorder.get_friction_coefficient(self.rows[-1:])[0])
 
     def remaining_transient(self, slip: float) -> float:
-        """Return the remaining transient of friction at a slip.
+        """Return the remaining transient of friction at a given slip.
 
         Parameters
         ----------
@@ -184,9 +184,10 @@ class NormalStressTransient(RecordingMeasure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scales of the numerical errors.
 
-        The scale of a result is the product of two factors: the absolute value of the result, and
-        one plus the ratio of ``a`` to the transient that remains at ``fit_to``. A larger relative
-        error is therefore permitted if the transient is small.
+        The scale of a result is ``abs(result) * (1 + a / transient)``, where ``a`` is the parameter
+        of the direct effect and ``transient`` is the transient that remains at the second point of
+        the exponential fit. A larger relative error is therefore permitted if the transient is
+        small.
 
         Parameters
         ----------
@@ -259,7 +260,7 @@ class NormalStressTransient(RecordingMeasure):
         return Outcome(Status.OK, {**values, **errors, **shown})
 
     def _reason_not_readable(self, scene: Scene) -> str:
-        """Return the reason why the transient cannot be read, or an empty string."""
+        """Return the reason why the transient cannot be evaluated, or an empty string."""
         step, coupling = scene.parts.loading.segments[0], scene.parts.normal_stress.coupling
         if step.load_velocity != 1.0 or step.displacement:
             return "the load point velocity is not V_* after the step"
@@ -304,7 +305,7 @@ class NormalStressTransient(RecordingMeasure):
     def _friction_at_slips(
         self, scene: Scene, rows: np.ndarray, integrator: Integrator
     ) -> dict[float, float]:
-        """Return friction at the slips that the measure evaluates.
+        """Compute friction at the values of slip that the measure uses.
 
         The recorded rows give an estimate of the time at which a given slip is reached. The motion
         is integrated to this time, and the slip rate at the end is used to correct the time.
@@ -336,7 +337,7 @@ class NormalStressTransient(RecordingMeasure):
         return found
 
     def _read_outputs(self, scene: Scene, record: _TransientRecord) -> dict[str, float]:
-        """Return the results that are read from the record.
+        """Compute the results from the record.
 
         Parameters
         ----------
@@ -416,11 +417,11 @@ class NormalStressTransient(RecordingMeasure):
         }
 
     def _departure_from_rigid(self, scene: Scene, record: _TransientRecord) -> float:
-        r"""Compute the largest difference of friction from the closed form.
+        r"""Compute the largest difference between friction and the closed form.
 
-        The closed form of a rigid slider is :math:`b\,R(-(\alpha/b) \ln r, \delta)`, with the
-        function :math:`R` that the law provides as ``relaxation``. The difference is evaluated at
-        all slips larger than ``fit_from``.
+        The closed form of a rigid slider is :math:`b\,R(-(\alpha/b) \ln r, \delta)`, where
+        :math:`R` is the relaxation function of the law. The difference is evaluated at all slips
+        larger than ``fit_from``.
 
         Parameters
         ----------

@@ -21,7 +21,7 @@ LN10 = math.log(10.0)
 def steady_line_key(cell: xr.Dataset) -> tuple[str, float, float]:
     """Return the parameters that determine the line of steady sliding.
 
-    Cells with the same key share the same line, so the line is drawn only once.
+    Cells with the same parameters have the same line, and this line is drawn only once.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 r"""Phase response of a limit cycle, and recurrence times under weak noise.
 
 A small change of the spring stress :math:`f` at some point of the cycle shifts all later events in
-time. The phase response :math:`Z` is the resulting advance of the later events in time, per unit
-change of each unknown. The phase response is the periodic solution of the adjoint of the linearised
-equations :math:`dy/dt = F(y)`,
+time. For each unknown, the phase response :math:`Z` is the time by which later events occur
+earlier, per unit change of the unknown. The phase response is the periodic solution of the adjoint
+of the linearised equations :math:`dy/dt = F(y)`,
 
 .. math::
 
@@ -37,7 +37,7 @@ THEORY_ACCURACY = Accuracy(rtol=1e-9, engine="compiled")
 
 
 class _CycleStart(NamedTuple):
-    """Unknowns except time at the start of a cycle, and cycle duration in D_c/V_*."""
+    """Start values of all unknowns except time, and duration of the cycle in D_c/V_*."""
 
     unknowns: np.ndarray
     duration: float
@@ -48,7 +48,7 @@ class PhaseResponse(Measure):
     r"""Sensitivity of the recurrence interval to weak white noise.
 
     The scene must have a limit cycle with one event per period, and must not include inertia or
-    noise. The results are the values of :math:`\sqrt{D}/T` for two types of noise: noise of the
+    noise. The results are the values of :math:`\sqrt{D}/T` for two types of noise: noise in the
     shear stress, and noise that acts equally on the shear stress and on the state variable.
     """
 
@@ -108,7 +108,7 @@ class PhaseResponse(Measure):
 
 
 def _find_cycle_start(scene: Scene, integrator: Integrator) -> _CycleStart:
-    """Return the cycle's point at which V rises through V_0, and its duration."""
+    """Find the cycle start (where V rises through V_0) and the cycle duration."""
     if not scene.is_perturbed:
         scene = scene.with_(displacement_step=0.1, load_velocity_ratio=scene.load_velocity)
     asked, times = rise("log_slip_rate", scene.log_load_velocity), []
@@ -220,7 +220,7 @@ def compute_phase_response(scene: Scene) -> Outcome:
 
 @dataclass(frozen=True)
 class NoisyRecurrence(EventStatistics):
-    """Statistics of the events, and predictions for weak noise of the shear stress.
+    """Statistics of the events, and predictions for weak noise in the shear stress.
 
     The fields are described in ``EventStatistics``.
     """
@@ -238,7 +238,7 @@ class NoisyRecurrence(EventStatistics):
     )
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the statistics and the theory.
+        """Compute the statistics of the events and the theoretical predictions.
 
         See ``EventStatistics.compute``.
         """

@@ -1,4 +1,4 @@
-"""Random scenes, and the quantities that are computed for the scenes.
+"""Random scenes, and measures to compute for each scene.
 
 A question consists of a measure and the random distributions of the loading parameters. All other
 parameters of a scene are drawn from wide ranges.

@@ -4,10 +4,11 @@ The values of limit cycles and of critical steps were computed with
 ``tests/benchmarks/extended_precision.py``. The program ``extended_precision.py`` integrates the
 equations in the variables of the paper, which differ from the variables of rsfstudy. The program
 uses extrapolated midpoint steps in extended precision (64-bit mantissa), and removes the error of
-the slow manifold by Richardson extrapolation. Each value was computed twice. The program switched
-between the equations without and with inertia at a slip rate norm of 0.02 in the first computation,
-and of 0.01 in the second. The two results agree to within the uncertainty that is listed with each
-value. All other values are closed forms that were evaluated to 30 digits.
+the slow manifold by Richardson extrapolation. Each value was computed twice. The program switches
+from the equations without inertia to the equations with inertia at a given norm of the slip rate.
+This norm was 0.02 in the first computation and 0.01 in the second computation. The two results
+agree to within the uncertainty that is listed with each value. All other values are closed forms
+that were evaluated to 30 digits.
 """
 
 from typing import NamedTuple

@@ -122,8 +122,8 @@ class SyntheticFit(Measure):
     """Fit of a synthetic record, compared with the exact parameters.
 
     The record is computed from the scene under a given protocol. Rows are evenly spaced in load
-    point displacement, or in time during a hold. The unit of slip of the scene is
-    ``slip_distance``.
+    point displacement, or in time during a hold. Slip in the scene is in units of the slip distance
+    (``slip_distance``).
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ class SyntheticFit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Outputs of the measure, for each parameter and for the quality of the fit."""
+        """Outputs for each parameter, and outputs that describe the quality of the fit."""
         by = [
             Output(name, "", "1", text, dims=("parameter",), error=name == self.primary_output)
             for name, text in _PARAMETER_OUTPUTS
@@ -210,7 +210,7 @@ class SyntheticFit(Measure):
 
     @property
     def _free_parameters(self) -> tuple[str, ...]:
-        """Names of the free parameters, with a number for each window."""
+        """Names of the free parameters, including the numbers of the fitted windows."""
         return add_window_numbers_to_parameter_names(self.free, len(self._window_segments()))
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
@@ -249,7 +249,7 @@ class SyntheticFit(Measure):
         return Outcome(Status.OK, self._compare_with_exact(search, found, true, promised, reasons))
 
     def _fit_noisy_record(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Draw a laboratory record, and fit it in the same way as the function ``fit``."""
+        """Generate a laboratory record, and fit the record as ``rsfstudy.fit()`` does."""
         from rsfstudy.measures import Fit  # The import is slow.
 
         kind, true = NOISE_KINDS[self.process], self._exact_parameters(scene)
@@ -444,7 +444,7 @@ def _build_rows(pieces: Sequence[_ProtocolSegment]) -> tuple[np.ndarray, np.ndar
 
 @lru_cache(maxsize=8)
 def _noise_factor(process: str, rows: int) -> np.ndarray:
-    """Return the matrix that converts white noise to correlated noise of a process."""
+    """Return the matrix that converts white noise to noise of a correlated process."""
     return np.asarray(np.linalg.cholesky(toeplitz(_correlations(process, rows))))
 
 

@@ -206,7 +206,7 @@ class WorkPrecision(ProblemMeasure):
 
     @property
     def relative_cost_by_digits(self) -> Mapping[float, float]:
-        """Relative number of right-hand-side evaluations for each requested accuracy.
+        """Relative cost of the computation for each requested number of digits.
 
         The work does not depend on the accuracy of the study, because each run has its own
         accuracy.

@@ -107,7 +107,7 @@ class Coverage(Measure):
 
     @property
     def output_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Names of the results along the dimension ``number``."""
+        """Names of the results, which label the ``number`` dimension."""
         return {"number": np.array(_ESTIMATED_OUTPUTS, dtype=object)}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
@@ -235,7 +235,7 @@ class CoverageStatistics(Reduction):
         return [Quantity(f"{self.name}_{k}", "", "1", f"{t}{among}") for k, t in texts.items()]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compute the statistics over all dimensions except the dimensions in ``by``.
+        """Compute the statistics over all dimensions except the grouping dimensions.
 
         Parameters
         ----------

@@ -113,7 +113,7 @@ def growth_threshold_claim(dilatancy: float, drainage: float) -> Claim:
 
 
 def drained_critical_stiffness(dataset: xr.Dataset) -> float:
-    """Return the critical stiffness of a drained fault, b - a.
+    """Return the critical stiffness of a drained fault, (b - a) sigma_*/D_c.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def drained_critical_stiffness(dataset: xr.Dataset) -> float:
 
 
 def plot_limits(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw the drained limit of k_cr, and the undrained limits at the left.
+    """Draw the drained limit of k_cr, and the undrained limits at slow drainage.
 
     Parameters
     ----------

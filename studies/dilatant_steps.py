@@ -3,8 +3,9 @@
 The spring is stiffer than critical at all drainage rates, so steady sliding is stable, and only a
 step of load point velocity can trigger an instability. The critical step increases with dilatancy,
 in particular at slow drainage. Before an instability, slip becomes much faster than drainage. The
-drained limit of the critical step is therefore reached only at a drainage rate that is a hundred
-times higher than for the stability of steady sliding (see the study dilatancy).
+critical step therefore reaches its drained limit only at very fast drainage. This drainage rate is
+a hundred times higher than the rate at which the critical stiffness reaches its drained limit (see
+the study dilatancy).
 """
 
 from typing import Any
@@ -61,7 +62,8 @@ def stabilisation_claim(fault: str, drainage: float, by: float) -> Claim:
 def fault_style(row: xr.Dataset) -> dict[str, Any]:
     """Return the line style of a fault.
 
-    The drained fault does not depend on drainage and is drawn in grey behind the other curves.
+    The curve of the drained fault is independent of the drainage rate and is drawn in grey behind
+    the other curves.
 
     Parameters
     ----------

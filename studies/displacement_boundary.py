@@ -6,8 +6,9 @@ which the slip rate reaches the instability norm. If the load point is held, the
 the slip law is D_c a/(b-a) at every stiffness. This closed form applies at constant normal stress
 and for a large instability norm. Variable normal stress changes the critical step very little. If
 the load point continues to move, the critical step is smaller, in particular for soft springs.
-Under the slowness law, the critical step is 1.7 to 8 times larger. On stiff springs, an instability
-under the slowness law occurs only if the slip rate reaches the instability norm during the step.
+Under the slowness law, the critical step is 1.7 to 8 times larger than under the slip law. On stiff
+springs, an instability under the slowness law occurs only if the slip rate reaches the instability
+norm during the step.
 """
 
 from typing import Any

@@ -1,4 +1,4 @@
-"""Cost of each physical effect in a limit cycle, and error if it is neglected.
+"""Cost of physical effects in a limit cycle, and error if an effect is neglected.
 
 The study combines all normal stress conditions with all types of dynamics, for both laws at k = 0.8
 k_cr. Without inertia and radiation damping, the slip rate is unbounded, except under the slowness

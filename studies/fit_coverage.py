@@ -8,8 +8,8 @@ from the usual formula, which assumes white noise. If the noise is correlated, t
 contain the exact parameters far less often. Other kinds of noise imitate imperfections of
 laboratory records, such as a changing noise level, outliers, rounded friction, an uneven clock,
 jitter or rounding of the displacement, and averaged friction. The fit reports that its standard
-errors are not valid if friction is rounded too coarsely, or if friction was averaged and the fit is
-not told about the averaging.
+errors are not valid if friction is rounded too coarsely, or if friction was averaged and the
+averaging time is not passed to the fit.
 """
 
 from collections.abc import Mapping
@@ -126,7 +126,7 @@ class ShareFlagged(Reduction):
 
 
 def plot_shares(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Plot the fraction of intervals with the exact value by kind of noise.
+    """Plot the fraction of intervals that contain the exact value, by kind of noise.
 
     Each parameter has a different marker. Full markers show the intervals of the fit, and open
     markers show the intervals of the usual formula.
@@ -180,7 +180,7 @@ def figure_height(dataset: xr.Dataset) -> float:
 
 
 def coverage_claims(series: str, words: str, **where: str) -> list[Claim]:
-    """Return the claims that two intervals have their nominal coverage.
+    """Return the claims that 68.3 % and 95.4 % intervals have nominal coverage.
 
     Parameters
     ----------

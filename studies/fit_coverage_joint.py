@@ -5,9 +5,10 @@ The records contain a single velocity step up, or a step up and a step back that
 with separate values of initial friction and trend. The noise is white or has a correlation of 0.9.
 Correlated noise reduces the effective sample size of a step to 26. In this case, the relative
 standard error of the longer slip distance from a single step is about one third. The errors of some
-other parameters are correlated with the error of this slip distance, and their log-likelihood is
-not parabolic. The confidence intervals are therefore computed from the profile likelihood. Full and
-open markers have the same meaning as in the study fit_coverage.
+other parameters are correlated with the error of this slip distance. As a function of these
+parameters, the log-likelihood is not parabolic. The confidence intervals are therefore computed
+from the profile likelihood. Full and open markers have the same meaning as in the study
+fit_coverage.
 """
 
 from dataclasses import replace

@@ -125,7 +125,7 @@ class RecoveryError(Measure):
         return {"parameter": np.array([*PARAMETERS], dtype=object)}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Return the scale of the largest deviation, which is 1.
+        """Return an error scale of 1 for the largest deviation.
 
         The deviations of the parameters are already divided by the scales of the parameters.
 

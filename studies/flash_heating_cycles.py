@@ -1,12 +1,12 @@
 """Stick-slip cycles with flash heating and radiation damping.
 
 With flash heating, the friction coefficient in a rupture decreases almost to the friction of
-weakened contacts, f_w. For V_w = 10^5 V_*, the static stress drop increases from 0.07 sigma_*
-without flash heating to 0.87 (mu_* - f_w), and the recurrence interval increases in proportion to
-the stress drop. If the weakening velocity is ten times lower, the static stress drop is almost
-equal to mu_* - f_w. When the slip rate reaches its peak, only a twentieth of the static stress drop
-has been released. For comparison, the lattice also contains V_w = 10^9 V_*. This weakening velocity
-is so high that flash heating has no effect.
+weakened contacts, f_w. Without flash heating, the static stress drop is 0.07 sigma_*. With flash
+heating at V_w = 10^5 V_*, the static stress drop is 0.87 (mu_* - f_w) sigma_*, and the recurrence
+interval increases in proportion to the stress drop. If the weakening velocity is ten times lower,
+the static stress drop is almost equal to (mu_* - f_w) sigma_*. When the slip rate reaches its peak,
+only a twentieth of the static stress drop has been released. For comparison, the lattice also
+contains V_w = 10^9 V_*. This weakening velocity is so high that flash heating has no effect.
 """
 
 import numpy as np

@@ -1,15 +1,16 @@
 """Slow fluid injection and the stability of steady sliding.
 
 Pore pressure around the fault rises slowly and falls again, according to a sampled record. The
-fault is drained, or dilatant with pores that drain into the surroundings. Before the injection, the
-spring is slightly softer than critical. The critical stiffness decreases with effective normal
-stress. Small perturbations therefore stop growing when k exceeds the critical stiffness at the
-current pressure in the fault, and start to grow again when k falls below the critical stiffness.
-For both laws, the comparison of k with the critical stiffness predicts the pore pressure at which
-perturbations stop or start to grow. The error of the prediction is about as large as the change of
-pressure during one or two D_c/V_*. While the pressure rises, slip is faster than V_0, so the ratio
-of drainage rate to slip rate is smaller. On a dilatant fault, the pressure at which perturbations
-stop growing is therefore lower than the pressure at which they start to grow again.
+fault is either drained or dilatant. The pores of the dilatant fault drain into the surroundings at
+a finite rate. Before the injection, the spring is slightly softer than critical. The critical
+stiffness decreases with effective normal stress. Small perturbations therefore stop growing when k
+exceeds the critical stiffness at the current pressure in the fault, and start to grow again when k
+falls below the critical stiffness. For both laws, the comparison of k with the critical stiffness
+predicts the pore pressure at which perturbations stop or start to grow. The error of the prediction
+is about as large as the change of pressure within a time of one or two D_c/V_*. While the pressure
+rises, slip is faster than V_0, and the ratio of drainage rate to slip rate is smaller. This smaller
+ratio lowers the critical stiffness of a dilatant fault. Perturbations on a dilatant fault therefore
+stop growing at a lower pressure than the pressure at which growth starts again.
 """
 
 import math
@@ -333,7 +334,7 @@ def max_pressure_rate(lasts: float) -> float:
 
 
 def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
-    """Return the claim that the stiffness is critical at an extremum (I1).
+    """Return the claim that k equals k_cr when growth stops or starts (I1).
 
     Parameters
     ----------
@@ -366,7 +367,7 @@ def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
 
 
 def critical_pressure_claim(at: str, law: str, case: str, within: float, reason: str) -> Claim:
-    """Return the claim that pressure is critical at an extremum (I2).
+    """Return the claim that growth stops or starts at the critical pressure (I2).
 
     Parameters
     ----------
@@ -416,7 +417,7 @@ RATE_REASON = (
 
 
 def pressure_panel(at: str) -> Panel:
-    """Return a panel of pore pressures at one of the extrema.
+    """Return a panel of the pore pressures at which growth stops or starts.
 
     Parameters
     ----------

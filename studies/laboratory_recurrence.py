@@ -3,8 +3,8 @@
 Pores close when the slip rate increases. Without noise, all recurrence intervals are equal at ten
 of the twelve normal stresses of the experiments. At 17.003 and 20.002 MPa, the cycle with one event
 per period is unstable, and long and short intervals alternate. The coefficient of variation (CV) of
-the intervals is 10 % and 20 % at these normal stresses. The motion is periodic, with two events per
-period.
+the intervals at these two normal stresses is 10 % and 20 %, respectively. The motion is periodic,
+with two events per period.
 
 White noise in the shear stress causes scatter of the intervals at all normal stresses. The CV
 differs from the CV of the stochastic model of Gualandi et al., because the noise in their model
@@ -63,7 +63,7 @@ def experiment_fields(normal_stress: float, noise: str) -> dict[str, Any]:
 
 
 def experiment_name(normal_stress: float, noise: str) -> str:
-    """Return the coordinate of an experiment."""
+    """Return the coordinate label of an experiment."""
     return f"{normal_stress:g} MPa" + ", noise" * (noise != "none")
 
 

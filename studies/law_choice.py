@@ -40,7 +40,7 @@ DECISIVE_AIC_DIFFERENCE = 4.0
 
 @dataclass(frozen=True)
 class LawChoiceShares(Reduction):
-    """Fractions of records for which the chosen law is correct, wrong or undecided.
+    """Fractions of records with a correct, a wrong or an undecided choice of law.
 
     Parameters
     ----------

@@ -9,8 +9,9 @@ step. Some laws evolve faster than the slip law far from steady sliding. These l
 critical steps than the slip law, in particular on stiff springs. Variable normal stress has little
 influence on the critical step under the slip law (Fig. 7 of the paper) and under similar laws.
 Variable normal stress has a larger influence under the slowness law and under a law with a cut-off
-velocity. The composite law has V_c = 100 V_*, and the cut-off velocity is 10^4 V_*. The instability
-norm is 1e6, which is high enough for the closed forms of an infinite norm.
+velocity. The composite law has V_c = 100 V_*, and the cut-off velocity is 10^4 V_*. The closed
+forms assume an infinite instability norm, and the norm of 1e6 in this study is high enough for them
+to apply.
 """
 
 import math

@@ -3,10 +3,11 @@
 A family of laws with the exponent eps connects the slip law (eps = 0) with the slowness law (eps =
 1). At constant normal stress and critical stiffness, the critical step is V_0/V_* = 1 + a/[(1 -
 eps)(b-a)], so zeta = 1/(1 - eps). Eq. 10 of the paper is the special case eps = 0. Under the
-slowness law, no velocity step triggers an instability if the instability norm is arbitrarily large.
-Variable normal stress lowers zeta. Close to the slowness law, the critical step disappears at
-variable normal stress, because k_cr decreases with V_0. The instability norm is 1e6, which is high
-enough for the closed form of an infinite norm.
+slowness law, the slip rate remains bounded after every velocity step. With an infinite instability
+norm, no velocity step therefore triggers an instability. Variable normal stress lowers zeta. At
+variable normal stress and with eps close to 1, no critical step exists. The reason is that k_cr
+decreases with V_0. The closed form assumes an infinite instability norm, and the norm of 1e6 in
+this study is high enough for it to apply.
 """
 
 import numpy as np

@@ -86,11 +86,12 @@ def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
 
 
 def plot_orbits(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw stress against slip rate, with lines of steady and constant state.
+    """Plot stress against slip rate, with lines of steady sliding and constant state.
 
     The relation between normal stress and shear stress may differ between cells. The line of steady
     sliding is drawn once for each relation. If there are more than two relations, the lines of
-    constant state are drawn only for the first one, because too many lines would overlap.
+    constant state are drawn only for the first relation, because otherwise too many lines would
+    overlap.
 
     Parameters
     ----------
@@ -179,9 +180,9 @@ def _label_line(
 
 
 def plot_along_slip(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw stress against slip over two limit cycles.
+    """Plot stress against slip over two periods of each limit cycle.
 
-    Dashed lines show the spring stress during the first cycle, and markers show the point of
+    Dashed lines show the spring stress during the first period, and markers show the point of
     fastest slip.
 
     Parameters

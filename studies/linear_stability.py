@@ -140,7 +140,7 @@ def plot_slowest_steady_rate(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
 
 
 def angle_label(row: xr.Dataset) -> str:
-    """Return a label with the driving angle and the slip rate of stabilisation.
+    """Return a label with the driving angle and the stabilising slip rate.
 
     The stiffness of the spring is 0.8 k_cr(V_*).
 

@@ -1,6 +1,6 @@
 """Critical velocity step from stable and unstable cells (Fig. 6).
 
-Each cell computes one motion and reports if its slip rate reaches the instability norm. The
+Each cell computes one motion and reports whether the slip rate reaches the instability norm. The
 critical step lies between the last stable and the first unstable cell, so its accuracy is limited
 by the spacing of the lattice. Two digits require 40 motions, whereas the study rate_step_stiffness
 obtains ten digits from a few paths.

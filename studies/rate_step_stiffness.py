@@ -3,9 +3,9 @@
 The critical step of load point velocity is computed for b/a = e. It increases with stiffness, and
 the increase is approximately exponential for the slip law. The critical step is much larger for the
 slowness law. Eq. 11 of the paper, V_0/V_* = exp(k/k_cr)/lambda, is exact only at k = k_cr. At
-larger stiffness, the critical step is up to 2.4 % smaller. The study rate_step_lattice finds the
-same critical step from stable and unstable cells, and the study instability_norm shows the
-influence of the instability norm.
+larger stiffness, the critical step is up to 2.4 % smaller than the equation predicts. The study
+rate_step_lattice finds the same critical step from stable and unstable cells, and the study
+instability_norm shows the influence of the instability norm.
 """
 
 import math

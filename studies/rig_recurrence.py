@@ -1,12 +1,12 @@
 """Recurrence interval and stress drop of laboratory stick-slip.
 
 The figures show the recurrence interval in s and the static stress drop in MPa against load point
-velocity in um/s at three normal stresses. The stiffness of the machine is 0.4, 0.2 and 0.1 of the
-critical stiffness at 5, 10 and 20 MPa. Stress drops decrease by slightly more than 2 (b-a) sigma
-per unit increase in the natural logarithm of the load point velocity. One half of this decrease is
-due to friction, and the other half is due to overshoot. Lines show the time in which the load point
-restores the stress drop if the slider is at rest. The recurrence interval is slightly longer,
-because the slider creeps during this time.
+velocity in um/s at three normal stresses. At 5, 10 and 20 MPa, the stiffness of the machine is 0.4,
+0.2 and 0.1 times the critical stiffness, respectively. Stress drops decrease by slightly more than
+2 (b-a) sigma per unit increase in the natural logarithm of the load point velocity. One half of
+this decrease is due to friction, and the other half is due to overshoot. Lines show the time in
+which the load point restores the stress drop if the slider is at rest. The recurrence interval is
+slightly longer than this time, because the slider creeps while the load point moves.
 """
 
 from dataclasses import replace
@@ -75,8 +75,9 @@ def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
 def slowness_law_drop_claim(stress: float) -> Claim:
     """Return a claim about the static drop under the slowness law (S2).
 
-    The static drop decreases by more than 2 (b-a) sigma if ln V_0 increases by 1, because the state
-    increases throughout the interval between events.
+    If ln V_0 increases by 1, the static drop decreases by more than 2 (b-a) sigma. The reason is
+    that the state increases throughout the interval between events, and this interval is shorter at
+    a higher V_0.
 
     Parameters
     ----------

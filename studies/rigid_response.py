@@ -92,7 +92,7 @@ def step_in_decades(row: xr.Dataset) -> int | None:
 def curve_style(row: xr.Dataset) -> dict[str, Any]:
     """Return the line style of a step.
 
-    Steps up are solid, and steps down are dashed.
+    Steps up are drawn as solid lines, and steps down are drawn as dashed lines.
 
     Parameters
     ----------

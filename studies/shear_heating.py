@@ -4,10 +4,10 @@ If both activation energies are equal, a higher temperature has the same effect 
 rate. At low slip rates, heating is negligible, and the steady friction decreases with slip rate. At
 the transition slip rate, the temperature rise is about R T^2/Q. Above the transition slip rate, the
 temperature increases so steeply with slip rate that the steady friction increases. The transition
-slip rate is proportional to the cooling rate. If the slip rate is V_* and cooling is slow, the
-critical stiffness is higher than without heat, because the direct effect of a higher temperature
-weakens the fault. With fast cooling, the temperature follows the slip rate, and the critical
-stiffness is slightly below (b - a) sigma_*/D_c.
+slip rate is proportional to the cooling rate. At the slip rate V_* and with slow cooling, the
+critical stiffness is higher than without heating. The reason is that a rise in temperature weakens
+the fault through the direct effect. With fast cooling, the temperature follows the slip rate, and
+the critical stiffness is slightly below (b - a) sigma_*/D_c.
 """
 
 import math

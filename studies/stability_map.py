@@ -7,11 +7,11 @@ peak slip rate remains below the instability norm, and stick-slip otherwise. A m
 damped oscillation if the eigenvalues are a complex pair, which is the case at stiffnesses up to
 about six times the critical stiffness. The critical stiffness at V_0, computed from the eigenvalues
 of steady sliding, bounds the region of limit cycles in every column of the map. At variable normal
-stress, this boundary decreases with V_0, and slow slip occurs in a narrow band below it. At
-constant normal stress, stick-slip occurs up to the boundary. Close to the boundary, motions
-approach their limit cycle slowly, over thousands of events, and small integration errors have large
-effects. The tolerance of the integration is therefore 300 times smaller than the requested
-accuracy.
+stress, the stiffness at this boundary decreases with V_0, and slow slip occurs in a narrow band
+below the boundary. At constant normal stress, stick-slip occurs up to the boundary. Close to the
+boundary, motions approach their limit cycle slowly, over thousands of events, and small integration
+errors have large effects. The tolerance of the integration is therefore 300 times smaller than the
+requested accuracy.
 """
 
 from collections.abc import Mapping, Sequence

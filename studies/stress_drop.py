@@ -170,7 +170,7 @@ def fit_line(drop: str, row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
 
 
 def curve_name(drop: str, row: xr.Dataset) -> str:
-    """Return the name of a case, with the slope if a line fits.
+    """Return the name of a case, with the slope if the drop is linear in ln V_0.
 
     Parameters
     ----------

@@ -5,8 +5,8 @@ out. The heating parameter E is the undrained increase of pore pressure due to a
 friction coefficient of 1. Without cooling and drainage, the critical stiffness is b - a + mu_*
 (mu_* + a) E in units of sigma_*/D_c, to first order in E. For E = 0.03, the critical stiffness is
 three times as high as without heating. If the fluid drains before the fault has slipped by a
-considerable fraction of D_c, the critical stiffness is b - a. Fast cooling with fast drainage even
-stabilises the fault slightly.
+considerable fraction of D_c, the critical stiffness is (b - a) sigma_*/D_c. Fast cooling with fast
+drainage even stabilises the fault slightly.
 """
 
 import numpy as np

@@ -4,9 +4,10 @@ The heating parameter E is the undrained increase of pore pressure due to a slip
 friction coefficient of 1. The static stress drop increases with E. For small E, the stress drop is
 the same as for a drained fault. For E = 0.01, the pore pressure in a rupture removes most of the
 effective normal stress. With the slip law, the stress drop is then almost seven times as large as
-for a drained fault. After such a rupture, the fluid drains and the strength recovers, so the lowest
-slip rate of the cycle is several orders of magnitude lower. The test for a repeating cycle ignores
-the temperature, because the steady temperature at the slip rate of a rupture is extremely large.
+for a drained fault. After such a rupture, the fluid drains and the strength recovers. The lowest
+slip rate of the cycle is therefore several orders of magnitude lower than for a drained fault. The
+test for a repeating cycle ignores the temperature. Otherwise, the extremely large steady
+temperature at the slip rate of a rupture would dominate the distance from steady sliding.
 """
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study

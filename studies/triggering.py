@@ -5,19 +5,20 @@ is displaced, and the load point is held afterwards. Alternatively, the load poi
 increases. The change of Coulomb stress is defined with the friction coefficient mu' = mu_* - alpha
 (1 - a/b). To first order in k/k_cr and for all laws, the critical decrease of normal stress and the
 critical displacement step cause the same change of Coulomb stress. Under the slip law, this rule of
-equal Coulomb stress also applies at larger stiffness. It is exact for alpha = 0, and accurate to
-within 3 % up to 2 k_cr for other values of alpha, even for inclined driving. Under the slowness
-law, the rule of equal Coulomb stress fails close to the critical stiffness. In this range, the
-Coulomb stress change of the critical decrease of normal stress is up to 2.4 times that of the
-critical displacement step, because a decrease of normal stress also lowers the critical stiffness.
-On very stiff springs, an instability occurs only if the slip rate reaches the instability norm
-during the step. The rule of equal Coulomb stress also fails on very stiff springs. If the state
-depends on normal stress, a larger decrease of normal stress is necessary to trigger an instability.
-The direct effect of the critical velocity step, a ln(V_0/V_*), is 0.6 to 1.03 times the stress
-change of the critical displacement step. In most cases, the direct effect is smaller than this
-stress change, because the load point continues to move after a velocity step. Below the critical
-stiffness, every velocity step triggers an instability. For inclined driving, the angle is 60
-degrees, and the decrease of normal stress is a decrease of sigma_3.
+equal Coulomb stress also applies at larger stiffness. The rule is exact for alpha = 0. For other
+values of alpha and for stiffnesses up to 2 k_cr, the rule is accurate to within 3 %, even for
+inclined driving. Under the slowness law, the rule of equal Coulomb stress fails close to the
+critical stiffness. In this range, the critical decrease of normal stress causes a change of Coulomb
+stress that is up to 2.4 times as large as the change due to the critical displacement step. The
+reason is that a decrease of normal stress also lowers the critical stiffness. On very stiff
+springs, an instability occurs only if the slip rate reaches the instability norm during the step.
+The rule of equal Coulomb stress also fails on very stiff springs. If the state depends on normal
+stress, a larger decrease of normal stress is necessary to trigger an instability. The direct effect
+of the critical velocity step, a ln(V_0/V_*), is 0.6 to 1.03 times the stress change of the critical
+displacement step. In most cases, the direct effect is smaller than this stress change, because the
+load point continues to move after a velocity step. Below the critical stiffness, every velocity
+step triggers an instability. For inclined driving, the angle is 60 degrees, and the decrease of
+normal stress is a decrease of sigma_3.
 
 The change of Coulomb stress is ``dtau - mu' dsigma``. A displacement d of the load point changes
 shear stress by K d, and normal stress by K d cot(phi). A step of imposed normal stress, or of
@@ -110,7 +111,7 @@ def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, rea
 
 
 def coulomb_limit_claim(law: str, case: str) -> Claim:
-    """Return the claim that Coulomb stress is critical on soft springs (N2).
+    """Return the claim that triggers need equal Coulomb stress on soft springs (N2).
 
     Parameters
     ----------

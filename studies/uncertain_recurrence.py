@@ -1,11 +1,12 @@
 """Distribution of a recurrence interval from the covariance of a fit.
 
-In a fit of a velocity step, the relative standard errors are 10 % for a and for b. The standard
-error of b - a is only 20 %, because the errors of a and b are correlated. The relative standard
-error of the slip distance D_c is 13 %, but D_c has little influence on the recurrence interval. The
-standard error of the recurrence interval of stick-slip is 15 % on the machine of this study. The
-recurrence interval depends on b - a through the stress drop, and on b through healing between
-events. If the errors of the parameters were independent, the standard error would be 90 %.
+In a fit of a velocity step, the relative standard errors are 10 % for a and for b. The errors of a
+and b are strongly correlated, so the relative standard error of their small difference b - a is
+only 20 %. The relative standard error of the slip distance D_c is 13 %, but D_c has little
+influence on the recurrence interval. On the machine of this study, the relative standard error of
+the recurrence interval of stick-slip is 15 %. The recurrence interval depends on b - a through the
+stress drop, and on b through healing between events. If the errors of the parameters were
+independent, the relative standard error of the recurrence interval would be 90 %.
 """
 
 import math

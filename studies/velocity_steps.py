@@ -32,11 +32,11 @@ STEP_DESCRIPTIONS = {0.01: "down by 100", 0.1: "down by 10", 10.0: "up by 10", 1
 
 
 def peak_departure(law: str, ratio: float) -> float:
-    """Compute the difference of peak friction from the closed form.
+    """Compute the difference in peak friction from a rigid slider, in closed form.
 
-    The difference is computed to first order in a/K. The difference has two causes. First, the
-    evolution is incomplete while slip accelerates. Second, the slider moves faster than the load
-    point while friction decreases. The higher slip rate increases the direct effect.
+    The closed form is of first order in a/K. The difference has two causes. First, the evolution is
+    incomplete while slip accelerates. Second, the slider moves faster than the load point while
+    friction decreases. The higher slip rate increases the direct effect.
 
     Parameters
     ----------

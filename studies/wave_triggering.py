@@ -1,14 +1,15 @@
-"""Clock advance of stick-slip events by a train of waves.
+"""Clock advance of stick-slip events due to a train of waves.
 
 A train of two waves changes the normal stress of a slider during its stick-slip cycle. The first
 half of each wave decreases normal stress. Small waves advance or delay the next event in proportion
 to their amplitude, as predicted by linear perturbation theory. Under the slowness law, waves have
-no effect if they end several nucleation times a sigma/(k V_0) before the event. Slow waves and
-strong waves trigger the event when Coulomb stress reaches the threshold at which an event occurs
-without waves. For slow waves with a period of a hundred nucleation times, the clock advance that
-this threshold predicts is accurate to a few percent. Strong waves raise Coulomb stress faster than
-the load point does. For strong waves, the error of the predicted clock advance is at most one
-nucleation time. In all other cases, the prediction is wrong by a factor of two to ten.
+no effect if they end several nucleation times before the event. The nucleation time is a sigma/(k
+V_0). Slow waves and strong waves trigger the event when Coulomb stress reaches the threshold at
+which an event occurs without waves. For slow waves with a period of a hundred nucleation times, the
+clock advance that this threshold predicts is accurate to a few percent. Strong waves raise Coulomb
+stress faster than the load point does. For strong waves, the error of the predicted clock advance
+is at most one nucleation time. In all other cases, the prediction is wrong by a factor of two to
+ten.
 """
 
 from collections.abc import Callable
@@ -248,7 +249,7 @@ def coulomb_error_claim(law: str) -> Claim:
 
 
 def over_amplitude(name: str) -> Callable[[xr.Dataset], xr.DataArray]:
-    """Return a function that divides a clock advance by the amplitude.
+    """Return a function that divides a clock advance by the amplitude of the waves.
 
     Parameters
     ----------
@@ -264,7 +265,7 @@ def over_amplitude(name: str) -> Callable[[xr.Dataset], xr.DataArray]:
 
 
 def theory_line(row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the clock advance of the applicable theory.
+    """Return the clock advance that the applicable theory predicts.
 
     The theory is the Coulomb threshold for the slowest waves, and linear perturbation theory for
     all other waves.

@@ -375,7 +375,7 @@ class Study:
     def compute_cell_field_changes(self, number: int) -> CellFieldChanges:
         """Compute the field values that the axes change in one cell.
 
-        This method does not build a scene, so it is faster than `cell`.
+        This method does not build a scene and is therefore faster than the method `cell`.
 
         Parameters
         ----------
@@ -467,7 +467,7 @@ class Study:
     def _inapplicable_base_scene_fields(self) -> frozenset[str]:
         """Fields that do not apply to the parts of the base scene.
 
-        The set is valid for cells in which no axis selects a part.
+        The set applies only to cells whose parts are the parts of the base scene.
         """
         parts = self.user_parts
         return SceneFields.find_inapplicable_fields(
@@ -477,7 +477,7 @@ class Study:
     def _compute_field_changes_from_rows(
         self, axis_rows: Sequence[AxisPointFieldValues]
     ) -> CellFieldChanges:
-        """Compute the changed fields of the cell at the given axis points."""
+        """Compute the field values that the given axis points change."""
         given, of_measure = self.split_scene_and_measure_fields(axis_rows)
         of_scene = self.convert_row_to_scene_fields(given)
         if _PART_SELECTING_FIELDS.isdisjoint(of_scene) and _PART_SELECTING_FIELDS.isdisjoint(given):
@@ -649,7 +649,8 @@ class Study:
     ) -> Axis:
         """Create an axis that varies one field.
 
-        For a study with a rig, numbers without units are assumed to be in ``units``.
+        For a study with a rig, numbers are assumed to be in the units that the ``units`` argument
+        specifies.
         """
         if self.rig is None:
             return Axis(field_name, values)
@@ -693,5 +694,5 @@ class Study:
 
 
 def _build_axis_rows_of_override(field_name: str, value: Any) -> list[AxisPointFieldValues]:
-    """Return one axis row for each value of an overridden field."""
+    """Return a list with one axis row per value of an overridden field."""
     return [{field_name: v} for v in (value if is_sequence_of_axis_values(value) else [value])]

@@ -117,7 +117,7 @@ def _is_module_in_directory_of(module_name: str, study_file: Path) -> bool:
 
 
 def _format_line_number_of_error(error: BaseException, study_file: Path) -> str:
-    """Return the line of the study file that raised an error.
+    """Format the line number at which an error was raised in the study file.
 
     The string is empty if the error was not raised in the study file.
     """

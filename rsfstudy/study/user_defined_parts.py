@@ -36,7 +36,7 @@ def find_user_parts_in_axis_rows(
 
 
 def list_user_field_quantities(user_parts: Iterable[UserPart]) -> Iterator[Quantity]:
-    """Return the quantities of the fields that user-defined parts add.
+    """Return the quantities that describe the scene fields of user-defined parts.
 
     Parameters
     ----------

@@ -29,16 +29,16 @@ from rsfstudy.study.reductions.base import (
 class LinearFit(Reduction):
     """Linear fit of a variable along one coordinate.
 
-    The equation ``of = constant + name * on`` is fitted by unweighted least squares.
+    The equation ``variable = constant + slope * coordinate`` is fitted by unweighted least squares.
 
     Parameters
     ----------
     name : str
-        Name of the slope in ``of = constant + name * on``. Four more variables are returned: the
-        standard error of the slope ``<name>_stderr``, the propagated numerical error of the cells
-        ``<name>_error`` (if the cells have error estimates), the largest absolute residual
-        ``<name>_misfit`` in the units of the variable, and the number of points ``<name>_points``.
-        The standard error is computed from the residuals.
+        Name of the slope. Four more variables are returned: the standard error of the slope
+        ``<name>_stderr``, the propagated numerical error of the cells ``<name>_error`` (if the
+        cells have error estimates), the largest absolute residual ``<name>_misfit`` in the units of
+        the variable, and the number of points ``<name>_points``. The standard error is computed
+        from the residuals.
     of : str
         Name of the variable to fit.
     on : str
@@ -92,7 +92,7 @@ class LinearFit(Reduction):
         return values - values.mean(dimension)
 
     def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
-        """Return the status of the cells in the coordinate range ``within``.
+        """Return the status of the cells in the fitted range of the coordinate.
 
         Parameters
         ----------
@@ -231,14 +231,14 @@ class LinearFit(Reduction):
 class ProportionalFit(LinearFit):
     """Linear fit with a fixed intercept.
 
-    The equation ``of - intercept = name * on`` is fitted by unweighted least squares. If the
-    intercept is not 0, as in ``V_0/V_* - 1``, the variable and the slope are assumed to be
-    dimensionless.
+    The equation ``variable = intercept + slope * coordinate`` is fitted by unweighted least
+    squares. If the intercept is not 0, the variable and the slope are assumed to be dimensionless.
+    An example is the velocity ratio ``V_0/V_*``, with an intercept of 1.
 
     Parameters
     ----------
     name : str
-        Name of the slope in ``of - intercept = name * on``.
+        Name of the slope.
     of : str
         Name of the variable to fit.
     on : str
@@ -305,17 +305,17 @@ class ProportionalFit(LinearFit):
 class SemilogFit(LinearFit):
     """Linear fit of a variable against the decimal logarithm of a coordinate.
 
-    The equation ``of = constant + name * log10(on)`` is fitted by unweighted least squares. The
-    slope is the change in the variable per decade. A slope per unit of the natural logarithm is
-    smaller by a factor of ln(10) = 2.303. Points are omitted if the coordinate is not positive. To
-    fit a power law, use `PowerLaw`. If you apply `SemilogFit` to the result of
-    `Logarithm`, which is a natural logarithm, the slope is 2.303 times the exponent of the power
-    law.
+    The equation ``variable = constant + slope * log10(coordinate)`` is fitted by unweighted least
+    squares. The slope is the change in the variable per decade. A slope per unit of the natural
+    logarithm is smaller by a factor of ln(10) = 2.303. Points are omitted if the coordinate is not
+    positive. To fit a power law, use `PowerLaw`. The result of `Logarithm` is a natural logarithm.
+    If you apply `SemilogFit` to this result, the slope is therefore 2.303 times the exponent of the
+    power law.
 
     Parameters
     ----------
     name : str
-        Name of the slope in ``of = constant + name * log10(on)``.
+        Name of the slope.
     of : str
         Name of the variable to fit.
     on : str
@@ -366,14 +366,14 @@ class SemilogFit(LinearFit):
 class PowerLaw(SemilogFit):
     """Fit of a power law to a variable as a function of a coordinate.
 
-    The equation ``log10(of) = constant + name * log10(on)`` is fitted by unweighted least squares.
-    The slope is the exponent of the power law, and the largest residual is given in decades. Points
-    are omitted if the coordinate or the variable is not positive.
+    The equation ``log10(variable) = constant + exponent * log10(coordinate)`` is fitted by
+    unweighted least squares. The result is the exponent of the power law. The largest residual is
+    reported in decades. Points are omitted if the coordinate or the variable is not positive.
 
     Parameters
     ----------
     name : str
-        Name of the exponent in ``log10(of) = constant + name * log10(on)``.
+        Name of the exponent.
     of : str
         Name of the variable to fit.
     on : str
@@ -418,7 +418,8 @@ class PowerLaw(SemilogFit):
     def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
         """Compute the derivatives of the exponent with respect to the cell values.
 
-        The derivatives are the coefficients of the linear fit divided by ``ln(10) * of``.
+        The derivatives are the coefficients of the linear fit, divided by ln(10) and by the value
+        of the variable.
 
         Parameters
         ----------

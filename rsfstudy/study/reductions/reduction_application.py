@@ -1,10 +1,10 @@
 """Application of reductions to the results of a study.
 
 ``apply_reductions`` is the main function. A reduction never uses failed or missing cells. If a
-result depends on failed or missing cells, the result is NaN, and the attribute ``refused`` of the
-result contains the reason. With the option ``despite_failures``, reductions omit failed cells and
-use the remaining cells. Finished cells without a value, such as cells with the status
-``stable_for_all_steps``, are omitted.
+result depends on failed or missing cells, the result is NaN, and its ``refused`` attribute contains
+the reason. With the option ``despite_failures``, reductions omit failed cells and use the remaining
+cells. Finished cells without a value, such as cells with the status ``stable_for_all_steps``, are
+omitted.
 """
 
 from __future__ import annotations

@@ -26,15 +26,15 @@ _SCALE_COORDINATE_BY_SCALE_SYMBOL = {
 def build_result_quantities(
     reduction: Reduction, dataset: xr.Dataset, reduction_results: xr.Dataset
 ) -> dict[str, Quantity]:
-    """Determine the quantities of the results of a reduction.
+    """Determine the units and descriptions of the results of a reduction.
 
     ``Reduction.fields_determining_result_units`` names one or two variables for each result. If one
     variable is named, the result has the units and the scale of this variable. If two variables are
     named, the units and the scale of the first variable are divided by the units and the scale of
     the second variable. Results without an entry in ``Reduction.fields_determining_result_units``
     are dimensionless. If the scale varies between the cells that were combined, the result has no
-    scale, and a note is appended to the attribute ``comment`` of the result. The description in the
-    vocabulary is used only if its units and scale agree with the units and scale of the result.
+    scale, and a note is appended to its ``comment`` attribute. The description in the vocabulary is
+    used only if its units and scale agree with the units and scale of the result.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def build_result_quantities(
 def find_scale_varying_along_dimensions(
     dataset: xr.Dataset, scale_expression: str, reduced_dimensions: Collection[Hashable]
 ) -> str:
-    """Find a scale that varies along reduced dimensions.
+    """Find the first scale that varies along the reduced dimensions.
 
     Parameters
     ----------

@@ -335,8 +335,8 @@ class Quantile(_SampleStatistic):
     """Quantile of a variable over samples.
 
     The quantile is interpolated linearly between two neighbouring samples. The standard error is
-    half the difference between two other quantiles. These two quantiles lie one binomial standard
-    deviation above and below ``level``.
+    half the difference between two other quantiles. The levels of these two quantiles are the
+    requested level plus and minus one binomial standard deviation.
 
     Parameters
     ----------
@@ -517,7 +517,7 @@ class StatusShares(Reduction):
         return [*super().quantities, Quantity("ended", "", "", "status of a sample")]
 
     def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
-        """Replace the status of all computed cells by ``OK``.
+        """Replace the status of all computed cells with ``OK``.
 
         Failed cells contribute to the shares, so they do not invalidate the result.
 
