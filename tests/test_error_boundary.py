@@ -148,7 +148,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: LinearFit("z", of=None, on="x"), "'of' must be a string"),
         (
             lambda r: reductions.apply_reductions(r, ()),
-            "'dataset' must be an xarray.Dataset .got Record",
+            "'dataset' must be an xarray.Dataset .got <Record",
         ),
         (lambda r: rsfstudy.run("a" * 300), "study 'aaa.*at most 255 bytes"),
         (

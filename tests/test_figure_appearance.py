@@ -260,7 +260,7 @@ def test_a_law_that_is_not_identified_has_no_band():
         fits._draw_record_with_fits(three_laws((0, 0, int(status))), axes)
         assert len(axes.collections) == bands
         names = axes.get_legend_handles_labels()[1]
-        assert any(name.endswith("if identified") for name in names) is (bands == 2)
+        assert any("if identified" in name for name in names) is (bands == 2)
 
 
 @pytest.mark.parametrize("failed", [(0,), (0, 1), (2,), (0, 1, 2)])

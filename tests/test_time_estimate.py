@@ -62,7 +62,7 @@ def lines(updates, monkeypatch, **options):
 
 
 def test_the_estimate_is_printed_once(monkeypatch):
-    updates = [(1.0, 10, None), (2.0, 20, 98.0), (3.0, 30, 97.0), (30.0, 300, 70.0)]
+    updates = [(0.0, 0, None), (1.0, 10, None), (2.0, 20, 98.0), (3.0, 30, 97.0), (30.0, 300, 70.0)]
     assert lines([*updates, (100.0, 1000, 0.0)], monkeypatch) == [
         "map: 20 of 1,000 cells are finished, about 1 min 38 s left",
         "map: 300 of 1,000 cells after 30 s, about 1 min 10 s left",
@@ -71,7 +71,7 @@ def test_the_estimate_is_printed_once(monkeypatch):
 
 
 def test_short_fits_show_no_progress(monkeypatch):
-    short, long = ([(time, 1000, 0.0)] for time in (19.0, 21.0))
+    short, long = ([(0.0, 0, None), (time, 1000, 0.0)] for time in (19.0, 21.0))
     assert lines(short, monkeypatch, item_name="fits", delay_seconds=20.0) == []
     assert lines(long, monkeypatch, item_name="fits", delay_seconds=20.0) == [
         "map: 1,000 of 1,000 fits after 21 s"
