@@ -32,10 +32,10 @@ class Dynamics(Part):
       :math:`x = \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and
       the states ``psis``, and ``rates`` contains the derivatives of ``state``.
     - ``build_rate_function_for_ruptures(friction)`` is optional. It returns a function
-      ``rate(state, p)``, which contains the inertial equations of motion, which are integrated during ruptures. The
-      function ``rate`` returns derivatives with respect to inertial time. The unknowns are the
-      spring stress f, the logarithm x = ln(V/V_*), the frictional stress g, and all states except
-      the first.
+      ``rate(state, p)`` with the inertial equations of motion, which are integrated during
+      ruptures. The function ``rate`` returns derivatives with respect to inertial time. The
+      unknowns are the spring stress f, the logarithm x = ln(V/V_*), the frictional stress g, and
+      all states except the first.
 
     Examples
     --------
