@@ -12,8 +12,8 @@ from enum import IntEnum, unique
 class Status(IntEnum):
     """Outcome of one cell.
 
-    Results files store the integer value of the status as a flag variable. Statuses with an integer
-    value of at least ``WORK_BUDGET_SPENT`` are not answers.
+    Results files store the integer value of the status as a flag variable. If the integer value is
+    ``WORK_BUDGET_SPENT`` or larger, the cell has no valid answer.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Status(IntEnum):
 
     @staticmethod
     def labels_by_code() -> dict[int, str]:
-        """Return the labels of all statuses by their integer codes in results files.
+        """Return a mapping from integer status codes to labels.
 
         Returns
         -------
@@ -126,7 +126,7 @@ class Status(IntEnum):
 
     @property
     def is_answer(self) -> bool:
-        """True if the status answers the question of the study.
+        """True if the status indicates a valid answer.
 
         An answer may be a statement without a number, for example that a slider is always stable.
         """

@@ -135,10 +135,12 @@ def compute_linear_friction_response(
 def _compute_state_weights_in_friction(
     scene: SceneView, steady_state: SteadySliding
 ) -> tuple[list[float], dict[int, float]]:
-    """Return the weight of each state in the friction relation.
+    """Return the weights of the states in friction, and derivatives of the state shift.
 
-    The function also returns a dictionary with the derivatives of the shift with respect to
-    temperature and pore pressure. The keys are the indices of the states.
+    The first returned value is a list with one weight per state. The second returned value is a
+    dictionary with the derivatives of the shift (the decrease in the state variable due to stress
+    and temperature) with respect to temperature and pore pressure. The keys of the dictionary are
+    the indices of these two unknowns in the tuple of states.
     """
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     weights, shifts = [1.0] * law, dict[int, float]()

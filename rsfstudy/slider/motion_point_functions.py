@@ -1,10 +1,9 @@
 r"""Functions for the stress, slip rate and states at a point of a motion.
 
-The module builds functions ``(state, rates, p) -> MotionPoint`` from the friction functions of a
-scene. The argument ``state`` contains the unknowns of the equations of motion, ``rates`` contains
-the derivatives of the unknowns, and ``p`` contains the parameters of the scene. Three sets of
-equations with different unknowns are used: between ruptures, during ruptures, and for a rigid
-slider.
+The module builds functions that compute a ``MotionPoint`` from the arguments ``(state, rates, p)``.
+The argument ``state`` contains the unknowns of the equations of motion, ``rates`` contains the
+derivatives of the unknowns, and ``p`` contains the parameters of the scene. Three sets of equations
+with different unknowns are used: between ruptures, during ruptures, and for a rigid slider.
 """
 
 from __future__ import annotations
@@ -103,10 +102,10 @@ def build_point_function_between_ruptures(
     force_balance_function: NumericFunction,
     log_slip_rate_growth_function: NumericFunction,
 ) -> NumericFunction:
-    """Return a function for the stress, slip rate and states between ruptures.
+    """Return a function that computes the stress, slip rate and states between ruptures.
 
-    The class ``Dynamics`` documents the functions ``(spring, psis, p)`` and ``(unknowns, rates, x,
-    g, p)`` of the dynamics.
+    The last two arguments are functions of the dynamics. They are documented in the class
+    ``Dynamics``, with the arguments ``(spring, psis, p)`` and ``(unknowns, rates, x, g, p)``.
 
     Notes
     -----
@@ -134,7 +133,7 @@ def build_point_function_between_ruptures(
 
 @cache
 def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> NumericFunction:
-    """Return a function for the stress, slip rate and states in ruptures."""
+    """Return a function that computes the stress, slip rate and states in ruptures."""
     assemble_point = build_motion_point_assembling_function(friction_functions)
     strength, states_at, end = (
         friction_functions.strength,
@@ -153,7 +152,7 @@ def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> Nu
 
 @cache
 def build_point_function_of_rigid_slider(friction_functions: FrictionFunctions) -> NumericFunction:
-    """Return a function for the stress, slip rate and states of a rigid slider.
+    """Return a function that computes the stress, slip rate and states of a rigid slider.
 
     The spring stress f of a rigid slider is equal to the frictional stress g.
     """

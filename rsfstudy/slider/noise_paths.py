@@ -1,8 +1,9 @@
 r"""Sample paths of noise that depend only on a seed and on the time.
 
-A path is defined at all dyadic times :math:`H j/2^l` of a base interval :math:`H`. The base
-interval is the product of a power of two and the sampling interval. The level :math:`l = 0`
-contains independent increments. Each further level inserts values at the midpoints. The value at a
+A path is defined at the times :math:`H j/2^l`, in which :math:`H` is the base interval, and the
+index :math:`j` and the level :math:`l` are integers. The base interval is the product of a power of
+two and the sampling interval. The level :math:`l = 0` contains independent increments. Each further
+level inserts values at the midpoints between the times of the previous level. The value at a
 midpoint is drawn from a normal distribution, whose mean is a weighted sum of the values at the two
 neighbouring times (bridge sampling). If a path is extended, its earlier values do not change. If
 the sampling interval is halved, the values at the previous sampling times do not change.
@@ -115,14 +116,14 @@ class UnitNoisePath(NamedTuple):
         return np.array(values[:stop_sample_index])
 
     def _compute_decay_and_innovation_deviation(self, time_step: float) -> tuple[float, float]:
-        """Return the decay factor of a step, and the standard deviation of its noise."""
+        """Return the decay factor of one time step, and the noise standard deviation."""
         if self.correlation_time is None:
             return 1.0, math.sqrt(time_step)
         decay = 2.0 * time_step / self.correlation_time
         return math.exp(-0.5 * decay), math.sqrt(-0.5 * self.correlation_time * math.expm1(-decay))
 
     def _compute_bridge_weight_and_deviation(self, neighbour_spacing: float) -> tuple[float, float]:
-        r"""Return the weight of both neighbours, and the midpoint standard deviation.
+        r"""Return the weight of each neighbour, and the midpoint standard deviation.
 
         With the correlation :math:`\rho` over half the spacing, the weight is
         :math:`\rho/(1 + \rho^2)`, and the variance of the Ornstein-Uhlenbeck process is reduced by
@@ -160,7 +161,7 @@ def iterate_noisy_loading_segment_blocks(
     shear_stress_path_and_amplitude: tuple[UnitNoisePath, float],
     normal_stress_path_and_amplitude: tuple[UnitNoisePath, float] | None,
 ) -> Iterator[np.ndarray]:
-    r"""Yield the segment table of noise in blocks.
+    r"""Yield the segment table of the noise, one block of rows at a time.
 
     Parameters
     ----------
@@ -171,9 +172,9 @@ def iterate_noisy_loading_segment_blocks(
     sampling_interval : float
         Sampling interval of the noise.
     shear_stress_path_and_amplitude : tuple of (Path, float)
-        Path and amplitude of the noise of shear stress.
+        Path and amplitude of the noise in shear stress.
     normal_stress_path_and_amplitude : tuple of (Path, float) or None
-        Path and amplitude of the noise of normal stress.
+        Path and amplitude of the noise in normal stress.
 
     Yields
     ------

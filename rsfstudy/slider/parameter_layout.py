@@ -77,7 +77,7 @@ class _HasParameterValues(Protocol):
 
 
 def pack_parameter_values(scene: SceneView) -> FloatTuple:
-    """Collect all parameters of a scene in a tuple.
+    """Return a tuple with all parameters of a scene.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def pack_parameter_values(scene: SceneView) -> FloatTuple:
 
 
 def pack_friction_parameter_values(scene: SceneView) -> FloatTuple:
-    """Collect the parameters that affect friction in a tuple.
+    """Return the parameter tuple for functions that depend only on friction.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def pack_friction_parameter_values(scene: SceneView) -> FloatTuple:
 
 
 def pack_temperature_parameter_values(scene: SceneView) -> FloatTuple:
-    """Return the parameters of the temperature of the fault.
+    """Return the parameters in the equations for the fault temperature.
 
     Parameters
     ----------

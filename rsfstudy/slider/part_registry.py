@@ -69,12 +69,12 @@ class PartSlot:
 
     @property
     def quantity_of_selecting_field(self) -> Quantity:
-        """``Quantity`` that describes the field whose value selects the part."""
+        """``Quantity`` that describes the scene field with the name of the slot."""
         return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
     def part_class_by_selecting_field(self) -> Mapping[str, type[Part]]:
-        """Mapping from field names to the parts that the fields select."""
+        """Mapping from each field that selects a part to the class of this part."""
         return {
             part.field_name_that_selects_part: part
             for part in self.built_in_parts.values()
@@ -196,7 +196,7 @@ def collect_scene_field_defaults() -> dict[str, Any]:
 
 
 class _UnsetDefault:
-    """Default in signatures of keyword arguments that may be omitted."""
+    """Placeholder that signatures show as the default of optional keyword arguments."""
 
     def __repr__(self) -> str:
         """Return the text that ``help`` displays."""
@@ -410,9 +410,9 @@ def _check_part_fields(slot: PartSlot, part: type[Part]) -> None:
 
 
 def register_user_parts(parts: Iterable[UserPart]) -> None:
-    """Register user-defined parts by name after they have been checked.
+    """Register user-defined parts that have already been checked.
 
-    An earlier part with the same name is replaced.
+    The parts are registered by name. A new part replaces an earlier part with the same name.
 
     Parameters
     ----------

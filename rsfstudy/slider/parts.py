@@ -1,9 +1,9 @@
 """Base class and field declarations of the parts of a slider.
 
 A scene has seven slots: the state evolution law, the normal stress condition, the pore fluid, the
-dynamics, the loading, the temperature and the noise. Each choice for a slot is a frozen
-dataclass derived from ``Part``, usually in its own module. The class declares the
-fields of the part with ``number`` and ``flag``.
+dynamics, the loading, the temperature and the noise. Each choice for a slot is a frozen dataclass
+derived from ``Part``, usually in its own module. The class declares the fields of the part with the
+functions ``number`` and ``flag``.
 
 The functions of a part are plain functions of floats. The functions receive the parameters of a
 scene as a flat tuple ``p``. The parameters of a part start at the index of its slot, for example
@@ -109,9 +109,9 @@ class Part:
     def __init_subclass__(cls) -> None:
         """Reset the derived properties if the subclass changes the equations.
 
-        The derived properties of a part follow from its equations. A subclass that overrides a
-        member of ``members_defining_equations`` therefore does not inherit the derived properties
-        of its base class.
+        The derived properties of a part follow from its equations. If a subclass overrides a member
+        that defines the equations (``members_defining_equations``), the subclass therefore does not
+        inherit the derived properties of its base class.
         """
         super().__init_subclass__()
         copy_former_overrides_to_new_names(cls)
@@ -127,8 +127,8 @@ class Part:
         """Return the values that the functions of the part read from ``p``.
 
         The first value is stored at the index of the slot. A law can have any number of values. For
-        all other parts, the number of values is limited (see ``parameter_layout``). Fields that a
-        subclass declares with ``number`` are appended in the order of their declaration. Override
+        all other parts, the number of values is limited (see ``parameter_layout``). Numeric fields
+        that a subclass declares are appended in the order of their declaration. Override
         ``parameter_values`` only if the functions read values other than the declared fields.
 
         Parameters
@@ -365,7 +365,7 @@ def list_part_field_names(part_class: type[Part]) -> tuple[str, ...]:
 
 @cache
 def _list_fields_appended_to_parameters(part_class: type[Part]) -> tuple[str, ...]:
-    """Return the names of the fields that are appended to ``parameter_values``.
+    """Return the names of the fields whose values follow ``parameter_values``.
 
     A field is appended if it is numeric and is declared in a subclass of the class that defines
     ``parameter_values``.
@@ -380,7 +380,7 @@ def _list_fields_appended_to_parameters(part_class: type[Part]) -> tuple[str, ..
 
 
 def collect_parameter_values(part: Part, scene: SceneView) -> FloatTuple:
-    """Return ``part.parameter_values``, followed by the appended fields.
+    """Return the parameter values of a part, followed by the values of the appended fields.
 
     Parameters
     ----------

@@ -60,12 +60,12 @@ def compute_resolvent_polynomials(
 
 
 def find_roots_with_one_very_large_root(polynomial: PolynomialCoefficients) -> np.ndarray:
-    """Find the roots of a polynomial in which one root is very large.
+    """Find the roots of a polynomial that has one very large root.
 
     If the mass of the slider is small, one root is about 1e20 times larger than the other roots. If
     all roots were computed together, the small roots would lose accuracy. The function therefore
-    computes the small roots from the polynomial without its leading coefficient. Finally, the
-    function refines all roots by Newton iterations.
+    computes the small roots from the polynomial without the leading term. Finally, the function
+    refines all roots by Newton iterations.
     """
     falling = polynomial[::-1]
     roots = np.append(np.roots(falling[1:]), -falling[1] / falling[0]).astype(complex)

@@ -2,9 +2,9 @@
 
 The attribute ``received_quantity_names`` of a part lists the quantities that are passed to its
 functions. If effective normal stress is constant, shear stress can be computed from the friction
-coefficient and the normal stress. A part can list additional quantities in its attribute ``needs``.
-If a quantity in ``needs`` is unavailable, the scene rejects the part, because the part would
-compute its rates from wrong values.
+coefficient and the normal stress. A part can list additional required quantities in its ``needs``
+attribute. If a required quantity is unavailable, the scene rejects the part. Otherwise, the part
+would compute its rates from wrong values.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ _QUANTITIES_COMPUTED_FROM_OTHERS: Mapping[str, frozenset[str]] = {
 
 
 def check_names_of_needed_quantities(slot_name: str, part_class: type[Part]) -> None:
-    """Raise ``InvalidValue`` if the attribute ``needs`` of a part is invalid.
+    """Raise ``InvalidValue`` if the ``needs`` attribute of a part is invalid.
 
-    The attribute ``needs`` must be a set of names of known quantities.
+    The ``needs`` attribute must be a set of names of known quantities.
 
     Parameters
     ----------

@@ -182,7 +182,7 @@ def build_rate_functions_in_rupture(
 
 
 def _add_noise_to_rupture_rates(rupture_rate_function: NumericFunction) -> NumericFunction:
-    """Add the noise of the spring stress to the rates per inertial time.
+    """Add noise in the spring stress to a rate function for ruptures.
 
     The last two parameters of a scene with noise are the inertial time and the rate of the noise.
     """
@@ -198,8 +198,9 @@ def _add_noise_to_rupture_rates(rupture_rate_function: NumericFunction) -> Numer
 def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -> NumericFunction:
     r"""Return the rate function of a rigid slider.
 
-    The returned function ``(state, p) -> tuple`` computes the derivatives with respect to slip of g
-    and of all states except the first. The last element of ``p`` is :math:`\ln(V/V_*)`.
+    The returned function ``(state, p) -> tuple`` computes derivatives with respect to slip. The
+    tuple contains the derivative of g, followed by the derivatives of all states except the first.
+    The last element of ``p`` is :math:`\ln(V/V_*)`.
 
     Notes
     -----

@@ -287,7 +287,7 @@ class SampledHistory(UserLoading):
         return True
 
     def isolate_segment(self, segment_index: int) -> SampledHistory:
-        """Return a history that consists of a single segment.
+        """Return a history that contains only the segment with the given index.
 
         See ``Loading.isolate_segment``.
         """

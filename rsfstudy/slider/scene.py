@@ -218,7 +218,7 @@ class Scene(SceneFunctions, SceneQuantities):
     direct_activation, evolution_activation : float, default: 0.0
         Activation terms :math:`Q/(R T_*)` of the direct effect and of the evolution effect.
     stress_noise, normal_stress_noise : float, default: 0.0
-        Amplitudes of the noise of shear stress and normal stress, in :math:`\sigma_*` per
+        Amplitudes of the noise in shear stress and normal stress, in :math:`\sigma_*` per
         :math:`\sqrt{D_c/V_*}`.
     noise_interval : float, default: 0.05
         Sampling interval of the noise in :math:`D_c/V_*`.
@@ -288,7 +288,7 @@ class Scene(SceneFunctions, SceneQuantities):
     # ---- related scenes -------------------------------------------------------------------------
 
     def without_mass(self) -> Scene:
-        """Return the scene with quasi-static dynamics instead of inertia.
+        """Return a copy of the scene with quasi-static dynamics instead of inertia.
 
         Returns
         -------
@@ -298,7 +298,7 @@ class Scene(SceneFunctions, SceneQuantities):
         return Scene(self.parts._replace(dynamics=QuasiStatic())) if self.has_mass else self
 
     def with_segment(self, segment: loading.Segment) -> Scene:
-        """Return the scene with a loading that consists of a single segment.
+        """Return a copy of the scene whose loading consists of the given segment.
 
         Parameters
         ----------
@@ -331,7 +331,7 @@ class Scene(SceneFunctions, SceneQuantities):
         return Scene(steady.parts._replace(loading_noise=NoNoise()))
 
     def segment_scene(self, segment_index: int) -> Scene:
-        """Return the scene during one segment of its loading.
+        """Return a scene whose loading is one segment of the loading of this scene.
 
         Parameters
         ----------
@@ -426,10 +426,10 @@ def _compute_cached_critical_stiffness(
     fluid_part: fluid.Fluid,
     temperature_part: temperature.Temperature,
 ) -> float:
-    """Compute the critical stiffness of all sliders with the same friction.
+    """Compute the critical stiffness from the parts and parameters that define friction.
 
-    Because the critical stiffness does not depend on the stiffness of the slider, the function sets
-    this stiffness to the value of the parameter ``a``.
+    The critical stiffness does not depend on the stiffness of the slider. The function therefore
+    uses a slider with an arbitrary stiffness, equal to the parameter ``a``.
     """
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
     others = QuasiStatic(), StepLoading(), temperature_part

@@ -140,7 +140,7 @@ def replace_field_values(
 def _group_values_by_part_index(
     field_values: Mapping[str, Any], field_lookup: FieldLookup
 ) -> dict[int, dict[str, Any]]:
-    """Validate the field values, and group the values of each part.
+    """Validate the field values, and group them by the index of their part.
 
     Fields with the value None are omitted.
     """
@@ -235,7 +235,7 @@ class FieldLookup(NamedTuple):
 
 @cache
 def build_field_lookup(part_classes: tuple[type[Part], ...]) -> FieldLookup:
-    """Build the field index of scenes from the classes of their parts.
+    """Build the table that assigns scene fields to parts, given the part classes.
 
     Parameters
     ----------

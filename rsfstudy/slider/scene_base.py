@@ -111,8 +111,8 @@ class SceneBase(HtmlTableMixin):
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain Python values.
 
-        Some slots, such as ``temperature``, did not exist in the first file format. Such a slot is
-        omitted from the dictionary if it has its default value.
+        Some slots, such as ``temperature``, did not exist in the first file format. If such a slot
+        contains its default part, the slot is omitted from the dictionary.
 
         Returns
         -------

@@ -31,7 +31,7 @@ else:
 def cached_per_scene(
     function: Callable[Concatenate[Any, ParametersAfterScene], FunctionResult],
 ) -> Callable[Concatenate[Any, ParametersAfterScene], FunctionResult]:
-    """Cache the results of a function in the scene passed as first argument.
+    """Cache the results of a function in the scene that is its first argument.
 
     Parameters
     ----------

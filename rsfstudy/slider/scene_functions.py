@@ -1,7 +1,8 @@
 """Methods of scenes: equations of motion, steady sliding and stability.
 
-The methods are functions of other modules whose first argument is a scene. Modules that ``scene``
-imports call the functions directly, because they cannot import the class ``Scene``.
+Each method is a function that another module defines and that takes a scene as its first argument.
+Modules that are imported by the module ``scene`` call these functions directly, because an import
+of the class ``Scene`` would be circular.
 """
 
 from __future__ import annotations

@@ -44,7 +44,8 @@ class SceneQuantities(SceneBase):
     def stress_imposing_part(self) -> Loading | Noise:
         """Part whose unknowns impose stress.
 
-        The part is the noise if the noise changes normal stress, and otherwise the loading.
+        If the noise changes normal stress, the property returns the noise. Otherwise, the property
+        returns the loading.
         """
         return self.parts.loading_noise if self.parts.loading_noise.unknowns else self.parts.loading
 
@@ -60,9 +61,10 @@ class SceneQuantities(SceneBase):
     def part_changing_effective_stress(self) -> Fluid | Loading | Noise | FluidWithBoundaryPressure:
         """Part whose unknowns change the effective normal stress.
 
-        If the loading has unknowns, the pressure source is the loading. Otherwise, the pressure
-        source is the fluid. If both the loading and the fluid have unknowns, the pressure source
-        combines both parts. In the combination, the loading imposes the pressure around the fault.
+        If the stress-imposing part (the loading or the noise) has no unknowns, the property returns
+        the fluid. If only the stress-imposing part has unknowns, the property returns this part. If
+        the fluid also has unknowns, the property returns a combination of both parts, in which the
+        stress-imposing part imposes the pressure around the fault.
         """
         imposed, pores = self.stress_imposing_part, self.parts.fluid
         if not imposed.unknowns:
@@ -173,7 +175,7 @@ class SceneQuantities(SceneBase):
 
     @property
     def starts_unsteady(self) -> bool:
-        """True if the initial stress or state differs from steady sliding."""
+        """True if the initial stress or state differs from its value in steady sliding."""
         return bool(
             self.parts.slider_parameters.initial_stress
             or self.parts.slider_parameters.initial_state
@@ -183,8 +185,8 @@ class SceneQuantities(SceneBase):
     def inertial_time(self) -> float:
         """Time scale of inertia, T/(2 pi), in units of D_c/V_*.
 
-        The instability norm is a limit of the product of this time scale and the slip rate in units
-        of :math:`V_*`. A motion is considered unstable if this product reaches the limit.
+        A motion is considered unstable if the product of this time scale and :math:`V/V_*` reaches
+        the instability norm.
         """
         slider = self.parts.slider_parameters
         return slider.period * slider.reference_rate / (2.0 * math.pi)

@@ -1,8 +1,9 @@
 """Protocol with the attributes of a scene that the parts and the equations read.
 
-A scene consists of parts, so modules of parts cannot import the class ``Scene``, even for type
-annotations, without an import cycle. Modules of parts use the protocol ``SceneView`` instead. To
-avoid the same import cycle, the protocol declares the parts and the compiled functions as ``Any``.
+The module of the class ``Scene`` imports the modules of the parts. If a part imported ``Scene``,
+even for type annotations, the imports would form a cycle. Modules of parts therefore use the
+protocol ``SceneView``. For the same reason, the protocol declares the parts and the compiled
+functions as ``Any``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 r"""Linear stability of steady sliding, computed from the friction relation.
 
-`compute_critical_stiffness` and `compute_largest_linear_growth_rate` are the main functions. Both
-functions work for any combination of parts.
+The main functions are `compute_critical_stiffness` and `compute_largest_linear_growth_rate`, which
+work for any combination of parts.
 
 A small perturbation of slip, :math:`du`, grows as :math:`\exp(p s)` with slip :math:`s` in units of
 :math:`D_c`. The module ``linear_response`` computes the perturbation of the frictional stress,
@@ -51,7 +51,7 @@ _SMALL_LEADING_COEFFICIENT_RATIO = 1e-6
 def compute_critical_stiffness(
     scene: SceneView, log_slip_rate: float, *, quasi_static: bool = False
 ) -> float:
-    r"""Compute the critical stiffness of steady sliding at a slip rate.
+    r"""Compute the critical stiffness of steady sliding at a given slip rate.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def compute_critical_stiffness(
 
 
 def compute_all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
-    r"""Compute all critical stiffnesses of steady sliding at a slip rate.
+    r"""Compute all critical stiffnesses of steady sliding at a given slip rate.
 
     At a critical stiffness, a small perturbation of steady sliding neither grows nor decays. A
     scene with several states may have more than one critical stiffness.
@@ -136,10 +136,10 @@ def compute_all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> 
 def _find_critical_stiffnesses(
     linearised_balance: LinearisedForceBalance, min_stiffness: float
 ) -> list[float]:
-    """Find all stiffnesses above a minimum at which a growth rate is imaginary.
+    """Find all critical stiffnesses above a given minimum.
 
-    The stiffnesses are in ascending order. If inertia prevents a finite critical stiffness at some
-    frequency, the list contains ``math.inf``.
+    At a critical stiffness, a growth rate is imaginary. The stiffnesses are in ascending order. A
+    critical stiffness that inertia makes infinite is included as ``math.inf``.
     """
     # For p = i omega, the polynomials depend on omega**2 only.
     (a_even, a_odd), (b_even, b_odd) = (
@@ -168,7 +168,7 @@ def _find_critical_stiffnesses(
 def _compute_growth_rates(
     linearised_balance: LinearisedForceBalance, stiffness: float
 ) -> np.ndarray:
-    """Compute the growth rates p at a stiffness, sorted by descending real part."""
+    """Compute the growth rates p at a given stiffness, sorted by descending real part."""
     spring_stress = [
         stiffness,
         linearised_balance.radiation_damping,
@@ -369,7 +369,7 @@ def compute_spring_response_to_normal_stress(
 
 
 def _compute_steady_sliding_or_raise(scene: SceneView, log_slip_rate: float) -> SteadySliding:
-    """Return steady sliding, or raise ``ValueError`` if it does not exist."""
+    """Compute steady sliding, or raise ``ValueError`` if steady sliding does not exist."""
     steady = compute_steady_sliding(scene, log_slip_rate)
     if steady is None:
         raise ValueError(f"steady sliding does not exist at ln(V/V_*) = {log_slip_rate:g}")

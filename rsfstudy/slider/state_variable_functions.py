@@ -32,7 +32,7 @@ _CHECKED_LOG_SLIP_RATES, _REST_TOLERANCE = (0.0, -0.5, 0.5), 1e-6
 def wrap_single_state_evolution_for_tuples(
     single_state_evolution: NumericFunction,
 ) -> NumericFunction:
-    r"""Return the function ``evolutions`` of a law with one state.
+    r"""Convert the evolution function of a law with one state to a function of tuples.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def compute_default_steady_state(
 def get_evolution_and_steady_state_functions(
     law: LawBase,
 ) -> tuple[NumericFunction, NumericFunction]:
-    """Return the functions ``evolutions`` and ``steady_states`` of a law.
+    """Return the evolution function and the steady-state function of a law.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def return_isothermal_state_variable(
 def combine_law_and_auxiliary_rates(
     law_state_rates: NumericFunction, auxiliary_rates: NumericFunction, law_state_count: int
 ) -> NumericFunction:
-    """Return an evolution function for the law states and other unknowns.
+    """Combine the evolution functions of the law and of the other unknowns.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def combine_law_and_auxiliary_rates(
 def combine_law_and_auxiliary_steady_states(
     law_steady_states: NumericFunction, auxiliary_steady_states: NumericFunction
 ) -> NumericFunction:
-    """Return a steady-state function for the law states and other unknowns.
+    """Combine the steady-state functions of the law and of the other unknowns.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def build_tuple_sum_function(term_count: int) -> NumericFunction:
 
 @cache
 def build_tuple_scaling_function(component_count: int) -> NumericFunction:
-    """Return a function that scales the first elements of a tuple.
+    """Return a function that multiplies the first elements of a tuple by a number.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def build_tuple_scaling_function(component_count: int) -> NumericFunction:
 
 @cache
 def build_function_adding_state_changes(state_count: int) -> NumericFunction:
-    """Return a function that advances the states by a step.
+    """Return a function that adds a multiple of the state changes to the states.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def _write_tuple_sum_expression(tuple_name: str, term_count: int) -> str:
 
 
 def _build_function_from_expression(argument_names: str, expression: str) -> NumericFunction:
-    """Create a function from the source code of its arguments and return value.
+    """Create a function from strings with its argument names and its return expression.
 
     The source code contains no loop, because the compiler cannot iterate over tuples.
     """
@@ -255,7 +255,7 @@ def _build_function_from_expression(argument_names: str, expression: str) -> Num
 def build_state_contribution_function(
     law_state_count: int, pressure_derivatives: NumericFunction | None
 ) -> NumericFunction:
-    r"""Return a function for the contribution of the states to the slip rate.
+    r"""Return a function that computes the contribution of the states to the slip rate.
 
     Parameters
     ----------
@@ -374,7 +374,7 @@ def _compute_evolution_jacobian(
     finite_difference_scale: float,
     p: FloatTuple,
 ) -> list[list[float]]:
-    """Compute the Jacobian matrix of the evolution by central differences.
+    """Compute the Jacobian matrix of the state evolution by central differences.
 
     The step size is 1e-4 times ``finite_difference_scale``.
     """

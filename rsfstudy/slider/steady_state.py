@@ -53,7 +53,7 @@ class SteadySliding:
 
 @cached_per_scene
 def compute_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | None:
-    r"""Compute steady sliding of a scene at a slip rate.
+    r"""Compute steady sliding of a scene at a given slip rate.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-r"""Effects of the temperature rise on friction, and its evolution.
+r"""Evolution of the temperature rise, and its effects on friction.
 
 The temperature rise :math:`\vartheta` is the first element of the tuple of states after the states
 of the law. With :math:`\Lambda = -\vartheta/(1 + \vartheta)`, the state :math:`\Psi = \Theta +
@@ -198,7 +198,7 @@ def _add_temperature_effect_to_strength(
 def _add_temperature_to_state_contribution(
     contribution_function: NumericFunction, temperature_indices: _TemperatureIndices
 ) -> NumericFunction:
-    """Return a function for the friction change due to states and temperature."""
+    """Return a function that computes the friction change due to states and temperature."""
     place, first, end = (
         temperature_indices.state_index,
         temperature_indices.first_parameter_index,
@@ -218,7 +218,8 @@ def _add_temperature_to_state_contribution(
 def _build_state_variable_function(temperature_indices: _TemperatureIndices) -> NumericFunction:
     r"""Return a function that computes the state variable.
 
-    The sum of the states minus the shift is :math:`\Theta + b q_b \Lambda`.
+    The returned function subtracts :math:`b q_b \Lambda` from the sum of the states minus the
+    shift.
     """
     place, second = temperature_indices.state_index, temperature_indices.first_parameter_index + 1
 
@@ -235,11 +236,12 @@ def _build_state_variable_function(temperature_indices: _TemperatureIndices) -> 
 def _build_normal_stress_function(
     total_normal_stress_function: NumericFunction, *, has_pressure: bool, is_linear: bool
 ) -> NumericFunction:
-    r"""Return a function ``(friction, psis, p)`` for the effective normal stress.
+    r"""Return a function that computes the effective normal stress.
 
-    The frictional stress :math:`g` solves :math:`\mu_* + g = \mu s(g)`. Newton's method needs a
-    single iteration if the normal stress :math:`s` is a linear function of :math:`g`. If
-    ``has_pressure`` is True, the last state reduces the normal stress.
+    The arguments of the returned function are ``(friction, psis, p)``. The frictional stress
+    :math:`g` solves :math:`\mu_* + g = \mu s(g)`. Newton's method needs a single iteration if the
+    normal stress :math:`s` is a linear function of :math:`g`. If ``has_pressure`` is True, the last
+    state reduces the normal stress.
     """
     iterations = 1 if is_linear else _NORMAL_STRESS_NEWTON_ITERATION_COUNT
 
@@ -265,10 +267,10 @@ def _build_temperature_rate_function(
     law_state_count: int,
     temperature_indices: _TemperatureIndices,
 ) -> NumericFunction:
-    r"""Return a function ``(x, psis, shift, fraction, p)`` for the temperature rate.
+    r"""Return a function that computes the rate of the temperature rise.
 
-    The friction coefficient is
-    :math:`\mu = \mu_* + a \ln V + \Psi - \mathrm{shift} - (b q_b - a q_a) \Lambda`.
+    The arguments of the returned function are ``(x, psis, shift, fraction, p)``. The friction
+    coefficient is :math:`\mu = \mu_* + a \ln V + \Psi - \mathrm{shift} - (b q_b - a q_a) \Lambda`.
     """
     place, first, end = (
         law_state_count,
@@ -298,7 +300,7 @@ def _combine_law_temperature_and_other_rates(
     law_state_count: int,
     pressurisation_parameter_index: int,
 ) -> NumericFunction:
-    """Return an evolution function for law states, temperature and other unknowns.
+    """Combine the evolution functions of the law, the temperature and the other unknowns.
 
     The pressurisation index is 0 if heat does not change the pore pressure.
     """
@@ -337,8 +339,8 @@ def _insert_nan_for_steady_temperature(
     """Return a steady-state function that sets the temperature rise to NaN.
 
     The temperature rise is not computed here, because ``compute_steady_temperature_rise`` would
-    have to solve an equation, and because the distance from steady sliding does not depend on the
-    temperature rise.
+    have to solve an equation. The temperature rise is also not needed, because the distance from
+    steady sliding does not depend on the temperature rise.
     """
 
     def steady_states(log_slip_rate: float, shift: float, p: FloatTuple) -> FloatTuple:
@@ -358,9 +360,9 @@ def _insert_nan_for_steady_temperature(
 def compute_steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
     r"""Compute the temperature rise of steady sliding.
 
-    Several temperatures may be steady at the same slip rate. The function selects the temperature
-    rise that changes continuously from zero as the slip rate changes from :math:`V_*` to the given
-    slip rate.
+    At a given slip rate, steady sliding may be possible at several temperatures. The function
+    selects the temperature rise that changes continuously from zero as the slip rate changes from
+    :math:`V_*` to the given slip rate.
 
     Parameters
     ----------

@@ -246,7 +246,7 @@ def _parse_segment(
 
 
 def _read_positive_number(declared_segment: Mapping[str, Any], key: str, rule: str) -> float:
-    """Return a value from a mapping. The value must be positive and finite."""
+    """Return a value from a mapping, and check that the value is positive and finite."""
     value = declared_segment[key]
     if not (_is_real_number(value) and 0.0 < value < math.inf):
         raise InvalidValue(key, value, f"must be {rule}")
@@ -256,7 +256,7 @@ def _read_positive_number(declared_segment: Mapping[str, Any], key: str, rule: s
 def _build_validated_segment(
     velocity: Any, displacement_step: Any, duration: Any, normal_stress: Any
 ) -> Segment:
-    """Return a ``Segment`` whose values have been validated."""
+    """Validate the values of a segment, and return the ``Segment``."""
     if not _is_real_number(velocity) or not math.isfinite(velocity):
         raise InvalidValue("velocity", velocity, "must be a finite number")
     if not _is_real_number(displacement_step) or not math.isfinite(displacement_step):

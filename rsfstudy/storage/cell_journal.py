@@ -144,11 +144,11 @@ class CellJournal:
     ) -> None:
         """Check that the stored fingerprint is compatible with the fingerprint of a run.
 
-        The code digests must be equal only for the modules that both fingerprints contain, because
-        the results in the journal do not depend on the other modules. The run may also have a
-        larger work budget than the journal, because the result of a finished cell does not depend
-        on the budget. If the fingerprints differ only in these two ways, the method stores the
-        merged fingerprint. For any other difference, the method raises ``DataError``.
+        The code digests are compared only for modules that both fingerprints contain. The results
+        in the journal do not depend on the other modules. The run may also have a larger work
+        budget than the journal, because the result of a finished cell does not depend on the
+        budget. If the fingerprints differ only in these two ways, the method stores the merged
+        fingerprint. For any other difference, the method raises ``DataError``.
         """
         try:
             stored = dict(json.loads(stored_fingerprint))
@@ -262,10 +262,11 @@ class CellJournal:
     def _query_rows_of_cells(
         self, cell_keys: np.ndarray, column_names: str
     ) -> Iterator[tuple[list[int], list[Any]]]:
-        """Yield stored rows in groups, and skip cells that are not in the journal.
+        """Yield the stored rows of the given cells in groups.
 
-        Each group consists of two lists. The first list contains indices into ``cell_keys``, and
-        the second list contains the corresponding rows.
+        Cells that are not in the journal are skipped. Each group consists of two lists. The first
+        list contains indices into ``cell_keys``, and the second list contains the corresponding
+        rows.
         """
         for start in range(0, len(cell_keys), _MAX_CELL_KEYS_PER_QUERY):
             wanted: list[bytes] = cell_keys[start : start + _MAX_CELL_KEYS_PER_QUERY].tolist()
@@ -285,7 +286,7 @@ class CellJournal:
 def _copy_journal_rows_into_arrays(
     cell_arrays: CellResultArrays, cell_indices: list[int], journal_rows: list[Any]
 ) -> None:
-    """Copy stored rows of the journal into columns.
+    """Copy rows of the journal into the arrays of cell results.
 
     If a row is damaged, the function raises a ``KeyError``, ``OverflowError``, ``TypeError`` or
     ``ValueError``.

@@ -54,9 +54,9 @@ _ZARR_DIGEST_ATTRIBUTE = "digest"
 def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     """Write a dataset to a NetCDF file.
 
-    At any time, ``path`` contains either the old file or the complete new file. A program that has
-    opened the old file can continue to read the old data. If a process is killed while it writes
-    the temporary file, the temporary file remains until the next write overwrites it.
+    At any time, the file at ``path`` is either the old file or the complete new file. A program
+    that has opened the old file can continue to read the old data. If a process is killed while it
+    writes the temporary file, the temporary file remains until the next write overwrites it.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def open_zarr_store(path: Path) -> xr.Dataset:
 
 
 def write_zarr_store_digest(store: Path) -> None:
-    """Write the digest of all files of a Zarr store to its attributes.
+    """Store a digest of all files of a Zarr store in the attributes of the store.
 
     Parameters
     ----------

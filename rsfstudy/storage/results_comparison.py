@@ -96,7 +96,10 @@ def _build_agreement_table(
     first_fingerprint: Mapping[str, Any],
     second_fingerprint: Mapping[str, Any],
 ) -> pd.DataFrame:
-    """Build the table of compared variables, with fingerprint differences in attrs."""
+    """Build the table of compared variables.
+
+    The ``attrs`` of the table contain the differences between the fingerprints.
+    """
     frame = pd.DataFrame(variable_rows, columns=_AGREEMENT_TABLE_COLUMNS)
     frame.attrs["differs"] = find_fingerprint_differences(first_fingerprint, second_fingerprint)
     return frame
@@ -169,8 +172,8 @@ class ResultsComparison:
     agreement_table : pandas.DataFrame
         Comparison of the variables in the cells that are finished in both datasets. The function
         ``compare_results_of_same_study`` documents the columns. If the primary output has no error
-        estimates, every pair of different values of the primary output is counted in
-        ``variables_differing_beyond_errors``.
+        estimates, every pair of different values of the primary output is counted in the column
+        ``beyond_errors``.
     uncompared_variables : mapping of str to str
         Reason why a variable is not compared, by name of the variable.
     """
@@ -348,8 +351,8 @@ def _find_uncomparable_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict
 def _compare_variables_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
     """Compare the numeric variables in the cells that both datasets share.
 
-    If the primary output has no error estimates, each of its values that differs is counted in
-    ``beyond_errors``.
+    If the primary output has no error estimates, ``beyond_errors`` is the number of values of the
+    primary output that are not identical.
     """
     frame = compare_results_of_same_study(*shared_cells)
     about = find_primary_output_name(shared_cells[0])

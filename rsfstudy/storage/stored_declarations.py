@@ -375,7 +375,7 @@ def build_reduction(reduction_declaration: Mapping[str, Any], path_in_file: str)
 def _find_declared_class(
     declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
 ) -> Any:
-    """Look up an rsfstudy class by its name in study declarations.
+    """Return the rsfstudy class that has the given name in study declarations.
 
     The function first searches the package that exports the measures or the reductions. If the
     package has no class with this name, the function also searches the modules of the named

@@ -226,7 +226,10 @@ def build_study_from_declaration(
 
 
 def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
-    """Return the user-defined parts of a study and all other registered parts."""
+    """Return a mapping from names to the parts of a study and all other registered parts.
+
+    The mapping contains only user-defined parts. If the study is None, the mapping is empty.
+    """
     others = {
         name: part for slot in SceneFields.PART_SLOTS for name, part in slot.user_parts.items()
     }

@@ -150,7 +150,7 @@ def _relabel_overridden_point(
 
 
 def _format_without_rounding(value: Any) -> str:
-    """Format a value with six digits, or with all digits if rounding changes it."""
+    """Format a value with six digits, or with all digits if six digits are not exact."""
     short_text = format_number_or_text(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text

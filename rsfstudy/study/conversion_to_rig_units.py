@@ -10,7 +10,7 @@ from rsfstudy.study.study import Study
 
 
 def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
-    """Convert a dimensionless study to a study with a rig.
+    """Convert a dimensionless study to a study in rig units.
 
     The axes and the fit ranges are converted to rig units. Fields defined by the rig replace the
     corresponding fields of the base scene.

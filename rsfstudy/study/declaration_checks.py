@@ -1,7 +1,7 @@
 """Checks of study declarations.
 
-The functions check types, names, and the fields that axes vary. The constructor of ``Study`` calls
-most of these functions.
+The functions check types and names, and check which fields the axes vary. The constructor of
+``Study`` calls most of these functions.
 """
 
 from __future__ import annotations
@@ -246,8 +246,8 @@ def check_field_is_set_at_all_axis_points(
     """Raise InvalidValue if an overridden field is set at only some axis points.
 
     At the other axis points, the field has the value of the base scene, and the override would not
-    change this value. The override is accepted if the field has no value or no meaning at the
-    points that do not set the field.
+    change this value. The override is accepted if, at the other axis points, the value is None or
+    zero, or the field does not apply to the scene.
 
     Parameters
     ----------
@@ -354,8 +354,8 @@ def build_unknown_name_error(
 def _describe_measure_outputs(measure: Measure) -> str:
     """Describe the results of a measure and the fields that the measure solves for.
 
-    The description is a string, because two NaN values compare equal only after conversion to
-    strings.
+    The description is a string, so that two descriptions with NaN values can be equal. As numbers,
+    two NaN values are never equal.
     """
     inner = {name: np.asarray(at).tolist() for name, at in measure.output_coordinates.items()}
     return repr((measure.primary_output, dict(measure.variables), inner, measure.solved_fields))

@@ -45,11 +45,10 @@ BUILT_IN_FIGURE_NAMES = frozenset(
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """Panel of a figure, repeated for each point of the axes in ``facet``.
+    """Panel of a figure, drawn once for each combination of points of the facet axes.
 
-    Functions that take a dataset are called with the portion of the results shown in the panel.
-    Functions that take the data of one curve are called with the portion of the results drawn as
-    that curve.
+    A function that takes a dataset receives the results shown in the panel. A function that takes
+    the data of one curve receives only the results of this curve.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from rsfstudy.slider import Scene
 
 
 class Cell(NamedTuple):
-    """Cell of a lattice, with its scene and its changed measure fields.
+    """Cell of a lattice, with its scene and the measure fields that the axes change.
 
     Parameters
     ----------

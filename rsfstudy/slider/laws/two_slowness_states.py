@@ -72,10 +72,10 @@ class TwoStateSlownessLaw(TwoStateLaw):
     evolutions = staticmethod(compute_state_evolutions)
 
     def check(self, scene: SceneView) -> None:
-        """Check that both states have an effect.
+        """Check that the parameter b of each state is nonzero.
 
-        See ``Part.check``. A state without an effect is rejected because the evolution equations
-        divide by its parameter b.
+        See ``Part.check``. A state with b = 0 is rejected, because the evolution equations divide
+        by b.
         """
         for name in ("b1_over_a", "b2_over_a"):
             if not getattr(self, name):

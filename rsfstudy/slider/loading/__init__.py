@@ -55,7 +55,7 @@ class Segment(NamedTuple):
     normal_stress: float = 0.0
 
     def as_dict(self) -> dict[str, float]:
-        r"""Return the segment as a mapping that ``protocol`` accepts.
+        r"""Return the segment as a mapping that the function ``protocol`` accepts.
 
         Returns
         -------
@@ -86,8 +86,8 @@ class Loading(Part):
     displacement in :math:`D_c`, a duration in :math:`D_c/V_*` and an imposed normal stress in
     :math:`\sigma_*`. The last segment must have an infinite duration.
 
-    If a loading changes normal stress continuously, the changes are described by unknowns. A
-    loading with unknowns defines the class attributes ``unknowns``, ``auxiliary_rates`` and
+    If a loading changes normal stress continuously, the loading adds unknowns to the equations of
+    motion. The class of such a loading defines the attributes ``unknowns``, ``auxiliary_rates`` and
     ``auxiliary_steady_states`` in the same way as ``Fluid``, and the method ``initial_unknowns``.
     All unknowns must be zero in steady sliding. The last unknown is the decrease in imposed normal
     stress, divided by :math:`\sigma_*`. Only the first segment of the loading has unknowns.
@@ -137,7 +137,7 @@ class Loading(Part):
         return ()
 
     def check(self, scene: SceneView) -> None:
-        """Check the segment durations and the fluid of the scene.
+        """Check the segment durations, and the compatibility of the loading with the fluid.
 
         A fluid with unknowns and a loading with unknowns can be combined only if the loading
         changes the pore pressure around the fault.
@@ -195,7 +195,7 @@ class Loading(Part):
         return {"segments": [segment.as_dict() for segment in self.segments]}
 
     def isolate_segment(self, segment_index: int) -> Loading | Segment:
-        """Return the loading of a single segment.
+        """Return one segment of the loading as a separate loading.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
-r"""Base class of the oscillations of normal stress and of the load point.
+r"""Base class of the oscillations of normal stress and of the load point velocity.
 
-The oscillation begins at the time :math:`t_b` as :math:`\sin[2 \pi (t - t_b)/T_o + \phi_o]` and
-ends after a given number of cycles.
+The oscillation is proportional to :math:`\sin[2 \pi (t - t_b)/T_o + \phi_o]`. It starts at the time
+:math:`t_b` and ends after a given number of cycles.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ def compute_harmonic_oscillation_rates(
 ) -> FloatTuple:
     r"""Compute the rates of the two unknowns of a harmonic oscillation.
 
-    See ``Fluid`` for the arguments. The states are the unknowns :math:`y` and :math:`P`. The
-    function reads :math:`\omega D_c/V_*` from ``p[LOADING]`` and the amplitude :math:`A` from
-    ``p[LOADING + 1]``.
+    See ``Fluid`` for the arguments. The tuple ``states`` contains the two unknowns, :math:`y` and
+    :math:`P`. The function reads :math:`\omega D_c/V_*` from ``p[LOADING]`` and the amplitude
+    :math:`A` from ``p[LOADING + 1]``.
 
     Notes
     -----
@@ -174,7 +174,7 @@ class OscillationBase(LoadingWithFinalVelocityBase):
         return [True] * len(self.segments)
 
     def isolate_segment(self, segment_index: int) -> Loading | Segment:
-        """Return the loading of a single segment.
+        """Return one segment of the loading as a separate loading.
 
         See ``Loading.isolate_segment``. For the segment with the oscillation, the method returns an
         oscillation that begins immediately and has no end.

@@ -22,11 +22,11 @@ from rsfstudy.slider.scene_view import SceneView
 def compute_remaining_stress_change_rates(
     log_slip_rate: float, states: FloatTuple, slip_per_independent_variable: float, p: FloatTuple
 ) -> FloatTuple:
-    r"""Compute the rate of the remaining normal stress change of a ramp.
+    r"""Compute the rate of the unknown that describes a ramp of normal stress.
 
-    See ``Fluid`` for the arguments. The only state is :math:`P`, the remaining change in normal
-    stress. The function reads the rate of imposed normal stress, in :math:`\sigma_* V_*/D_c`, from
-    ``p[LOADING]``.
+    See ``Fluid`` for the arguments. The tuple ``states`` contains this unknown, :math:`P`, which is
+    the change in normal stress that the ramp has not yet imposed. The function reads the rate of
+    imposed normal stress, in :math:`\sigma_* V_*/D_c`, from ``p[LOADING]``.
 
     Notes
     -----
@@ -44,9 +44,9 @@ def compute_remaining_stress_change_rates(
 
 
 def return_zero_remaining_stress_change(log_slip_rate: float, p: FloatTuple) -> FloatTuple:
-    r"""Return the remaining normal stress change in steady sliding.
+    r"""Return zero, the remaining change in normal stress in steady sliding.
 
-    The remaining change is zero, because normal stress is constant in steady sliding.
+    In steady sliding, normal stress is constant, so no change remains.
     """
     return (0.0,)
 

@@ -1,8 +1,8 @@
-r"""Noise of shear stress and normal stress that is added to the loading.
+r"""Noise in shear stress and normal stress, which is added to the loading.
 
 Each module of this package defines one kind of noise. The function ``discover_parts`` finds the
-modules automatically. Noise is added to the loading as a sampled path. It is not an additional term
-in the equations of motion. Between two samples, the stress changes at a constant rate, and the
+modules automatically. Noise is added to the loading as a sampled path, not as an additional term in
+the equations of motion. Between two samples, the stress changes at a constant rate, and the
 resulting motion is integrated to the requested tolerance. If the noise is independent of the
 motion, the motion converges to the solution of the stochastic differential equation as the sampling
 interval decreases (Wong-Zakai theorem). The module ``noise_paths`` computes the paths from the
@@ -54,8 +54,8 @@ class Noise(Part):
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
         """Unknowns of the noise.
 
-        If the noise changes normal stress, the decrease in normal stress is an unknown. Noise of
-        shear stress does not need an unknown, because it changes the rate of the spring stress.
+        If the noise changes normal stress, the decrease in normal stress is an unknown. Noise in
+        shear stress is added directly to the rate of the spring stress and needs no unknown.
         """
         return _UNKNOWNS_OF_NORMAL_STRESS_NOISE if self.changes_normal_stress else ()
 
@@ -82,7 +82,7 @@ class Noise(Part):
     def iterate_noisy_loading_segment_blocks(
         self, start_time: float, end_time: float, load_velocity: float
     ) -> Iterator[Any]:
-        """Yield the segment table of the noise in blocks.
+        """Yield the segment table of the noise, one block of rows at a time.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class CorrelatedNoise(WhiteNoise):
-    r"""Noise of shear stress and normal stress with a correlation time.
+    r"""Noise in shear stress and normal stress, with a correlation time.
 
     The other fields are described in ``WhiteNoise``.
 
@@ -23,13 +23,13 @@ class CorrelatedNoise(WhiteNoise):
 
     Notes
     -----
-    The noise :math:`n(t)` of shear stress is an Ornstein-Uhlenbeck process,
+    The noise :math:`n(t)` in shear stress is an Ornstein-Uhlenbeck process,
 
     .. math::
 
         dn = -\frac{n}{t_c} \, dt + \epsilon \, dW,
 
-    and so is the noise of normal stress. Both start at zero. After a few correlation times, the
+    and so is the noise in normal stress. Both start at zero. After a few correlation times, the
     standard deviation of the noise is :math:`\epsilon \sqrt{t_c/2}`. For times much shorter than
     the correlation time, the noise equals white noise of the same amplitude.
     """

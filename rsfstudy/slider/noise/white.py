@@ -26,10 +26,10 @@ class WhiteNoise(Noise):
     Parameters
     ----------
     stress_noise : float, default: 0.0
-        Amplitude :math:`\epsilon` of the noise of shear stress, in :math:`\sigma_*` per
+        Amplitude :math:`\epsilon` of the noise in shear stress, in :math:`\sigma_*` per
         :math:`\sqrt{D_c/V_*}`.
     normal_stress_noise : float, default: 0.0
-        Amplitude :math:`\epsilon_\sigma` of the noise of normal stress, in the same units. Noise of
+        Amplitude :math:`\epsilon_\sigma` of the noise in normal stress, in the same units. Noise in
         normal stress requires a normal stress condition that allows the loading to change normal
         stress.
     noise_interval : float, default: 0.05
@@ -49,7 +49,7 @@ class WhiteNoise(Noise):
           \sigma(t) = \sigma_{\mathrm{smooth}}(t) + \epsilon_\sigma W_\sigma(t).
 
     The Wiener processes :math:`W` and :math:`W_\sigma` start at zero. Between the samples at
-    :math:`t_i = i h`, the paths are linear. The noise of shear stress does not directly change the
+    :math:`t_i = i h`, the paths are linear. The noise in shear stress does not directly change the
     state variable, so :math:`\ln V` has the same fluctuations as the shear stress. The seed, the
     interval and the amplitudes define the paths. The paths do not change if the motion is extended
     or if the interval is halved.
@@ -148,7 +148,7 @@ class WhiteNoise(Noise):
     def iterate_noisy_loading_segment_blocks(
         self, start_time: float, end_time: float, load_velocity: float
     ) -> Iterator[Any]:
-        """Yield the segment table of the noise in blocks.
+        """Yield the segment table of the noise, one block of rows at a time.
 
         See ``Noise.iterate_noisy_loading_segment_blocks``.
         """

@@ -35,8 +35,9 @@ from rsfstudy.slider.scene_view import SceneView
 class Temperature(Part):
     r"""Base class of the temperature models of the fault.
 
-    If the temperature changes, the subclass declares one unknown, the temperature rise, in
-    ``unknowns``. The subclass also defines the following function as a static method:
+    If the temperature changes, the ``unknowns`` attribute of the subclass contains a single
+    unknown, the temperature rise. The subclass also defines the following function as a static
+    method:
 
     - ``temperature_rate(log_slip_rate, rise, friction, normal_stress, fraction, parameters)``
       returns the change in the temperature rise per unit slip in :math:`D_c`, multiplied by

@@ -155,7 +155,7 @@ def _build_result_without_crossing(crossing_status: CrossingSearchStatus) -> Lev
 def _estimate_slope_changes(
     slopes: np.ndarray, interval_numbers: range
 ) -> tuple[dict[int, float], bool]:
-    """Estimate the total change in slope within each of several intervals.
+    """Estimate how much the slope of the curve changes within each interval.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _estimate_slope_changes(
 
 
 def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) -> int:
-    """Count the sign reversals among large changes in slope."""
+    """Count the sign reversals between successive slope changes above a threshold."""
     counted = slope_changes[np.abs(slope_changes) > min_slope_change]
     return int((counted[1:] * counted[:-1] < 0.0).sum())
 

@@ -56,8 +56,9 @@ class Reduction(ConstructorKeywordCheckMixin):
     """Base class of all reductions.
 
     Calling a reduction, as in ``reduction(dataset)``, returns a dataset with the new variables. To
-    write your own reduction, derive a frozen dataclass from this class. All fields except ``name``
-    and ``of`` are options of the reduction. A reduction must define one method::
+    write your own reduction, derive a frozen dataclass from this class. All fields other than the
+    name of the result (``name``) and the variable to reduce (``of``) are options of the reduction.
+    A reduction must define one method::
 
         __call__(self, dataset) -> xarray.Dataset
 
@@ -113,7 +114,7 @@ class Reduction(ConstructorKeywordCheckMixin):
     of: str
 
     def __init_subclass__(cls) -> None:
-        """Set the default ``kind`` of a subclass and accept former member names."""
+        """Set the default of the ``kind`` attribute, and accept former member names."""
         super().__init_subclass__()
         copy_former_overrides_to_new_names(cls)
         if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
@@ -235,7 +236,7 @@ def is_failed_or_pending(status: xr.DataArray) -> xr.DataArray:
 def find_worst_status_along_other_dims(
     status: xr.DataArray, kept_dimensions: Collection[Hashable]
 ) -> xr.DataArray:
-    """Return the largest status code along the dimensions that are not kept.
+    """Return the largest status code along the dimensions that the result does not have.
 
     Failures have the largest status codes.
 
@@ -257,7 +258,7 @@ def find_worst_status_along_other_dims(
 def set_failed_or_invalid_values_to_nan(
     dataset: xr.Dataset, variable_name: str, status: xr.DataArray
 ) -> xr.Dataset:
-    """Replace the values of failed cells and invalid error bounds by NaN.
+    """Set the values of failed cells, and error bounds that are invalid, to NaN.
 
     The values of failed cells are replaced by NaN. If the variable is a standard error or a bound
     of a confidence interval, values that are not valid are also replaced by NaN.
@@ -403,7 +404,7 @@ def select_coordinate_range(
 
 
 def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity]:
-    """Read the quantities of variables that are not in the vocabulary.
+    """Build quantities for the variables that are not in the vocabulary.
 
     Parameters
     ----------
@@ -435,9 +436,10 @@ def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity
 def _find_symbol_after_unit_conversion(
     variable_name: str, variable_attributes: Mapping[Any, Any]
 ) -> str:
-    """Return the symbol of a vocabulary quantity that is stored in other units.
+    """Return the vocabulary symbol of a variable whose units have been converted.
 
-    The symbol of a normalised quantity is a quotient, which is valid only without units.
+    If the vocabulary quantity is dimensionless, the function returns an empty string. The symbol of
+    a normalised quantity is a quotient, which would be wrong for a variable with units.
     """
     about = QUANTITY_BY_NAME.get(variable_name)
     same = about is not None and variable_attributes["long_name"] == about.long_name

@@ -78,7 +78,7 @@ class Boundary(Reduction):
     fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Find the boundary for each point along the other dimensions.
+        """Find one boundary for each combination of points along the other dimensions.
 
         If a cell along the coordinate failed, the boundary is NaN. Cells without a value are
         ignored.
@@ -222,7 +222,7 @@ class Inverse(Reduction):
         return [Quantity(f"{self.name}_status", "", "1", text, flags=flags)]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Find the coordinate value for each point along the other dimensions.
+        """Find one coordinate value for each combination of points along the other dimensions.
 
         Parameters
         ----------

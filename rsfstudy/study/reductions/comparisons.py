@@ -85,7 +85,7 @@ class Difference(Reduction):
     def compute_partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
     ) -> DerivativesWrtValueAndReference:
-        """Compute the derivatives with respect to the value and the reference.
+        """Compute the derivatives of the result with respect to value and reference.
 
         Parameters
         ----------
@@ -221,7 +221,7 @@ class RelativeDifference(Difference):
     def compute_partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
     ) -> DerivativesWrtValueAndReference:
-        """Compute the derivatives with respect to the value and the reference.
+        """Compute the derivatives of the result with respect to value and reference.
 
         Parameters
         ----------
@@ -276,7 +276,7 @@ class Range(Reduction):
     fields_determining_result_units: ClassVar[FieldsDeterminingUnitsByResultSuffix] = {"": ("of",)}
 
     def get_status_of_used_cells(self, status: xr.DataArray) -> xr.DataArray:
-        """Return the status of the cells in the coordinate range ``within``.
+        """Return the status of the cells inside the coordinate range (``within``).
 
         Parameters
         ----------
@@ -347,7 +347,7 @@ class Range(Reduction):
         return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]
 
     def _select_points_in_range(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
-        """Return the dimension and the points in the coordinate range ``within``."""
+        """Return the dimension to reduce, and the dataset restricted to the coordinate range."""
         along = self.over in dataset[self.of].dims
         dimension = self.over if along else find_dimension_of_coordinate(dataset, self.over)
         return dimension, select_coordinate_range(dataset, self.over, self.within)
@@ -427,7 +427,9 @@ class ClosedFormRatio(Reduction):
         return xr.Dataset({self.name: ratio, **beside})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesAndCellCoordinates:
-        """Compute the derivatives of the ratio (the reciprocal of the closed form).
+        """Compute the derivatives of the ratio.
+
+        Each derivative is the reciprocal of the closed-form solution.
 
         Parameters
         ----------
