@@ -108,7 +108,7 @@ class DatasetAccessor:
     @property
     @raise_only_rsfstudy_errors
     def rig(self) -> Rig:
-        """Rig of a fit, used to convert motions to the units of the record.
+        """Rig that a fit uses to convert motions to the units of the record.
 
         The slip distance and the stiffness of the rig are the fitted values. The reference velocity
         of the rig is the load point velocity before the step. The normal stress of the rig is the

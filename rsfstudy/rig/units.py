@@ -318,7 +318,7 @@ def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
 def _compute_si_factor_of_known_units(
     units_and_powers: Iterable[tuple[str, int]],
 ) -> SiFactorAndBaseUnitExponents:
-    """Multiply powers of units that are known without pint."""
+    """Multiply powers of units that rsfstudy can convert without pint."""
     scale, exponents = Fraction(1), [0] * 5
     for name, power in units_and_powers:
         size, of = _EXACT_FACTOR_AND_EXPONENTS_BY_UNIT[name]

@@ -20,8 +20,8 @@ from rsfstudy.slider.scene_caching import cached_attribute
 class SceneQuantities(SceneBase):
     """Base class of scenes, with properties that are computed from the fields.
 
-    The critical stiffness is a property of the subclass ``Scene``, because the computation of the
-    critical stiffness creates a scene.
+    The critical stiffness is a property of the subclass `Scene`, because a scene has to be created
+    to compute it.
     """
 
     if TYPE_CHECKING:
