@@ -684,7 +684,7 @@ def translate_former_member_name(owner_class: type, member_name: str) -> str:
 
 
 def copy_former_overrides_to_new_names(subclass: type) -> None:
-    """Copy members that a subclass defines under former names to their new names.
+    """Add the new names of members that a subclass defines under former names.
 
     If the subclass also defines the new name, the former name is ignored. If a dataclass field has
     a former name, and the base class has a property with the new name, the subclass gets a property
@@ -782,5 +782,5 @@ def _build_property_reading_field(field_name: str) -> property:
 
 
 def _format_module_and_qualified_name(class_or_function: Any) -> str:
-    """Return the key of a class or function in ``NEW_NAME_BY_OWNER_AND_FORMER_NAME``."""
+    """Return the key that ``NEW_NAME_BY_OWNER_AND_FORMER_NAME`` uses for a class or function."""
     return f"{class_or_function.__module__}:{class_or_function.__qualname__}"

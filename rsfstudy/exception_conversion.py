@@ -163,9 +163,9 @@ def _wrap_to_raise_rsfstudy_errors(
 
     If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
     stored in files. In this case, the arguments are also checked against their annotations. The
-    check follows the call, because an error that the constructor itself raises is more specific
-    than an error of the check. If the function has a ``convert_arguments`` attribute, the wrapper
-    calls this attribute to convert deprecated arguments.
+    check runs after the call, so that the more specific errors of the constructor are raised
+    first. If the function has a ``convert_arguments`` attribute, the wrapper calls this attribute
+    to convert deprecated arguments.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")

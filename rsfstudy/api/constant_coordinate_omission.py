@@ -61,8 +61,8 @@ def _read_constant_coordinate_value(coordinate: xr.DataArray) -> Any:
 def _use_scale_attribute_as_units(attributes: dict[Any, Any]) -> dict[Any, Any]:
     """Return the attributes of a variable with readable units.
 
-    The scale of a normalised variable becomes its ``units`` attribute. For a dimensionless variable
-    without a scale, the ``units`` attribute is omitted.
+    If a variable is normalised, the ``units`` attribute is set to the scale of the variable. For a
+    dimensionless variable without a scale, the ``units`` attribute is omitted.
     """
     replaced = {name: value for name, value in attributes.items() if name != "scale"}
     if replaced.get("units") == "1":

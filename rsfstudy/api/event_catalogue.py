@@ -379,7 +379,7 @@ def _convert_samples_to_finite_array(variable_name: str, values: Any) -> np.ndar
 
 
 def _rename_times_to_displacements(event_catalogue: xr.Dataset) -> xr.Dataset:
-    """Rename the ``time`` variable for a record that contains displacements but no times."""
+    """Rename the variable ``time`` to ``displacement``, for a record without times."""
     words = {
         "time": "displacement at the beginning of the event",
         "duration": "displacement during the event",

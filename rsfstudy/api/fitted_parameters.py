@@ -132,7 +132,7 @@ def _select_posterior_draws(
 
 
 def build_fitted_scene(dataset: xr.Dataset) -> Scene:
-    """Return the scene of a fit with the fitted parameters.
+    """Build a scene from the fitted parameters.
 
     The scene contains a single step of the load point velocity. Quantities are normalised by the
     fitted slip distance and the load point velocity before the step.

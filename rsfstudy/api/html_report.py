@@ -385,7 +385,7 @@ def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -
 def _read_png_width_in_inches(png_bytes: bytes) -> float:
     """Return the width in inches at which a PNG image is printed.
 
-    The page scales all figures by this width, so that text has the same size in all figures.
+    The page scales each figure in proportion to this width, so that all text has the same size.
     """
     at = png_bytes.find(b"pHYs") + 4
     pixels, per_metre = (int.from_bytes(png_bytes[n : n + 4]) for n in (16, at))

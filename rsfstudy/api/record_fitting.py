@@ -455,7 +455,7 @@ def _find_initial_stiffness(
 
 
 def _measure_stiffness_in_records(records: Sequence[Record]) -> tuple[float, float, float]:
-    """Measure the stiffness in the records.
+    """Measure the stiffness in the locked portions of the records.
 
     Returns
     -------

@@ -86,7 +86,7 @@ def simulate(
 ) -> xr.Dataset:
     """Integrate the motion of a scene.
 
-    The motion begins at time 0, immediately after the step of the loading, with the initial values
+    At time 0, immediately after the step of the loading, the motion starts from the initial values
     of the scene.
 
     Parameters
@@ -403,7 +403,7 @@ def build_motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[s
 
 
 def _build_state_variable_quantity(state_number: int) -> Quantity:
-    """Return the quantity of one state variable of a law with several states."""
+    """Return the ``Quantity`` that describes one state variable of a law with several states."""
     about = (
         f"contribution of state {state_number} of the law to the friction coefficient, without "
         "changes due to stress"
@@ -440,7 +440,7 @@ def _build_loading_history_variable(history: SampledHistory) -> xr.Variable:
 
 
 def _compute_log_instability_slip_rate(scene: Scene) -> float:
-    """Return the limit of ln(V/V_*) above which a motion is unphysical."""
+    """Return the value of ln(V/V_*) above which a motion is unphysical."""
     if scene.has_mass or scene.dynamics.radiated_stress_slope(0.0):
         return math.inf
     loads = np.asarray(scene.parts.loading.segment_table)[:, SEGMENT_VELOCITY]

@@ -164,7 +164,7 @@ class InterpolatorBetweenMotionRows:
         return merged
 
     def measure_event(self, first_row: int, last_row: int) -> EventNumbers:
-        """Measure the quantities of an event and their interpolation errors.
+        """Measure the quantities of an event, and estimate the interpolation errors.
 
         Parameters
         ----------
@@ -268,7 +268,7 @@ class InterpolatorBetweenMotionRows:
         return float(interpolant.derivative(time)[column])
 
     def _find_threshold_crossing_after_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Find the time between two rows at which slip rate crosses the threshold.
+        """Find when slip rate crosses the threshold between a row and the next row.
 
         Returns
         -------
@@ -288,7 +288,7 @@ class InterpolatorBetweenMotionRows:
         return many, error + self._is_too_coarse_to_interpolate(sides) * np.array(left)
 
     def _read_time_and_slip_at_end_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the time and slip of the first or last row, and zeros as their errors."""
+        """Return the time and slip at the first or last row, where both errors are zero."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
     def find_extremum_near_row(

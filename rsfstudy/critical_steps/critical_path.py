@@ -271,7 +271,7 @@ class CriticalPath(NamedTuple):
         return None if start is None else start.psi / self.scene_parameter_values[A]
 
     def compute_next_peak_height_above_norm(self, local_tolerance: float) -> float | None:
-        """Compute the height of the next ln V peak above the instability norm.
+        """Compute by how much the next peak of ln V exceeds the instability norm.
 
         The motion starts at the tangency point and is integrated forwards for one orbit. The
         returned misfit is zero if the orbit is a limit cycle that touches the instability norm.
@@ -294,7 +294,7 @@ class CriticalPath(NamedTuple):
     def next_peak_exceeds_instability_norm(self, local_tolerance: float) -> bool:
         """Return True if the next peak of ln V exceeds the instability norm.
 
-        In this case, the second peak of other motions may also reach the instability norm.
+        In this case, motions after smaller steps may reach the instability norm at a second peak.
 
         Parameters
         ----------

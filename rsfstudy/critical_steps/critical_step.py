@@ -86,7 +86,7 @@ _QUASI_STATIC_CRITICAL_STIFFNESS = Output(
 
 @cache
 def _build_outputs_for_stepped_field(stepped_field_name: str) -> tuple[Output, ...]:
-    """Return the outputs of a critical step of a given type."""
+    """Return the outputs that are computed for a given type of critical step."""
     critical = STEP_FAMILY_BY_SCENE_FIELD[stepped_field_name].critical_output_name
     confirmed = (f"{critical}_stable", f"{critical}_unstable")
     beside = (*confirmed, *STEP_FAMILY_BY_SCENE_FIELD[stepped_field_name].extra_output_names)
@@ -203,7 +203,7 @@ class CriticalStep(Measure):
         return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Return the scale of the numerical error of the critical step.
+        """Return the scale relative to which the error of the critical step is measured.
 
         The scale is the magnitude of the change in velocity, displacement or normal stress.
 
@@ -298,7 +298,7 @@ class CriticalStep(Measure):
         step_size_estimate: CriticalStepSizeEstimate,
         integrator: Integrator,
     ) -> Outcome:
-        """Confirm a critical step with motions after a smaller and a larger step.
+        """Confirm a critical step by simulating motions after a smaller and a larger step.
 
         The initial difference between the two step sizes and the critical step size is based on the
         estimated error of the critical step size. If the motions after the two steps do not confirm

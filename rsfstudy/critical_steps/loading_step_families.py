@@ -261,9 +261,9 @@ class LoadingStepFamily:
         """Return True if steady sliding is stable after every smaller step.
 
         If steady sliding is unstable after a smaller step, small oscillations grow, and the smaller
-        step may be critical. The critical stiffness decreases with the load point velocity, so a
-        test at the smallest and at the largest step is sufficient. If the friction law has a
-        characteristic slip rate, more step sizes are tested.
+        step may be critical. The critical stiffness reaches its maximum at one end of the range of
+        step sizes, so a test at the smallest and at the largest step is sufficient. If the friction
+        law has a characteristic slip rate, more step sizes are tested.
 
         Parameters
         ----------
@@ -287,7 +287,7 @@ class LoadingStepFamily:
 
 
 def compute_slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
-    r"""Compute the delay of a slider with inertia after a step.
+    r"""Compute the slip by which inertia delays the slider after a step.
 
     Parameters
     ----------
@@ -534,11 +534,11 @@ def _refine_misfit_root(
     local_tolerances: Iterable[float],
     misfit_function: Callable[[float, float], float | None],
 ) -> Iterator[float]:
-    """Yield the step size at the root of a misfit for decreasing local tolerances.
+    """Yield step sizes at which a misfit is zero, for decreasing local tolerances.
 
-    The refinement uses the secant method, starting from an approximate root and its slope with
-    respect to the log size. For each local tolerance, the iteration ends when the residual is less
-    than thirty times the tolerance. The iterator ends early if the secant method does not converge.
+    The secant method starts at an approximate root, with the slope of the misfit with respect to
+    the log step size. For each local tolerance, the iteration ends when the residual is less than
+    thirty times the tolerance. The iterator ends early if the secant method does not converge.
     """
     if not math.isfinite(misfit_slope) or misfit_slope == 0.0:
         return

@@ -84,7 +84,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
         return math.exp(self.sign * step_size)
 
     def _guess_critical_step_size(self) -> float:
-        """Return a guess based on the closed forms of Gu et al. (1984).
+        """Estimate the critical step size from the closed forms of Gu et al. (1984).
 
         The closed forms apply to the slip law.
         """
@@ -283,7 +283,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         self.min_size = min(self.min_size, MIN_STEP_SIZE * scene.a / scene.mu_star)
 
     def step_size_to_field_value(self, step_size: float) -> float:
-        """Return the change in normal stress of a step, in units of sigma_*.
+        """Return the change in normal stress for a given step size, in units of sigma_*.
 
         See ``LoadingStepFamily.step_size_to_field_value``.
         """
@@ -427,7 +427,7 @@ class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
         return load == -math.inf or scene.compute_steady_sliding(load) is not None
 
     def _compute_log_slip_rate_after_step(self, step_size: float) -> float:
-        """Return ln(V/V_*) immediately after the step, without inertia."""
+        """Return ln(V/V_*) immediately after the step, for the slider without inertia."""
         scene = self.build_scene_with_step(step_size).without_mass()
         steady_states = scene.compute_steady_states(0.0, 0.0)
         return scene.compute_slow_manifold_point(

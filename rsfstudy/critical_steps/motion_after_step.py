@@ -98,9 +98,9 @@ def compute_log_rate_above_instability_norm(scene: Scene, integrator: Integrator
     """Compute the excess of ln V over the instability norm after the step.
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
-    excess is the height of the highest peak of ln V above the norm. Without inertia, the excess is
-    the increase in ln V from one peak to the next. If possible, the excess is a continuous function
-    of the step size at the boundary between stable and unstable steps.
+    excess is the difference between the highest peak of ln V and the norm. Without inertia, the
+    excess is the increase in ln V from one peak to the next. If possible, the excess is a
+    continuous function of the step size at the boundary between stable and unstable steps.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def _follow_one_orbit(
 ) -> _OrbitOutcome:
     """Integrate an orbit until the outcome of the motion is certain.
 
-    The integration also ends if the orbit grows too slowly to decide the outcome.
+    The integration also ends if the orbit grows so slowly that the outcome remains uncertain.
     """
     norm = scene.log_slip_rate_at_instability
     levels = build_events_testing_monotone_rise(scene)
@@ -365,9 +365,9 @@ def _peaks_have_stopped_growing(
 def _compute_peak_excess_of_orbit_over_norm(
     orbit: _OrbitOutcome, log_slip_rate_at_norm: float, *, with_inertia: bool
 ) -> float:
-    """Compute an excess over the norm that changes sign at the critical step.
+    """Compute an excess of ln V over the norm, which changes sign at the critical step.
 
-    A single orbit may not reveal the sign of the excess.
+    If the sign depends on later orbits, the calling function corrects the sign.
     """
     if with_inertia:
         highest = max((orbit.initial_log_slip_rate, *orbit.log_slip_rate_peaks))

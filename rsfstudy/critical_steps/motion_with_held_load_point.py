@@ -44,7 +44,7 @@ _MAX_WEAKENING_OVER_SPRING_UNLOADING = 0.5
 
 
 def compute_peak_log_rate_excess_over_norm(scene: Scene, integrator: Integrator) -> float:
-    """Compute the height of the highest ln V peak above the instability norm.
+    """Compute by how much the highest peak of ln V exceeds the instability norm.
 
     The peak is the highest value of ln V in the motion. If the effect of inertia is small, the
     motion is integrated only up to the instability norm. In this case, the function returns the
@@ -97,8 +97,8 @@ def _build_event_specs_for_held_load_point(
 ) -> list[EventSpecification]:
     """Return the events at which the motion is tested.
 
-    The events are peaks of ln V, the rise to the instability norm, the loss of shear stress, and
-    crossings of decreasing levels of ln V below the norm.
+    The events are peaks of ln V, the rise of ln V to the instability norm, the loss of shear
+    stress, and the times at which ln V falls through each of a series of levels below the norm.
     """
     specs = [maximum("log_slip_rate")]
     if not with_inertia:

@@ -28,7 +28,7 @@ def is_slow_manifold_inaccurate(scene: Scene, integrator: Integrator) -> bool:
 
 
 def estimate_slow_manifold_relative_error(scene: Scene) -> float:
-    r"""Estimate the relative error of a critical step due to the slow manifold.
+    r"""Estimate the relative error that the slow manifold causes in a critical step.
 
     Parameters
     ----------

@@ -120,8 +120,8 @@ def _wrap_resource_tracker_unregister(unregister: Callable[..., None]) -> Any:
 def _tolerate_lost_resource_tracker() -> None:
     """Replace ``resource_tracker.unregister`` by its wrapper for the lifetime of the process.
 
-    The wrapper must stay installed, because semaphores are released whenever they are
-    garbage-collected.
+    The wrapper must stay installed, because a semaphore is released when it is garbage-collected,
+    which can happen at any time.
     """
     if not hasattr(resource_tracker.unregister, "__wrapped__"):
         resource_tracker.unregister = _wrap_resource_tracker_unregister(resource_tracker.unregister)

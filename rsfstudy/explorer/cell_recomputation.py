@@ -129,7 +129,7 @@ def recompute_cell_and_motion(
 def _extract_recorded_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[xr.Dataset | None, str, str]:
-    """Return the motion recorded by a measure, an explanation, and code for the motion."""
+    """Return the motion that a measure recorded, an explanation, and code for the motion."""
     dims = measure.variables.get("log10_slip_rate", ())
     names = [n for n in outcome.values if measure.variables[n] == dims]
     if len(dims) != 1 or not {*_X_VARIABLES_OF_MOTION_PLOT} & {*names}:
@@ -144,7 +144,7 @@ def _extract_recorded_motion(
 def _choose_loading_of_recomputed_motion(
     measure: Measure, scene: Scene, outcome: Outcome
 ) -> tuple[dict[str, tuple[float, str]], str]:
-    """Return the loading fields of a motion, their Python code, and an explanation."""
+    """Choose the loading fields, with values and Python code, and explain the choice."""
     loads = [name for name in measure.solved_fields if name in _FALLBACK_STEP_SIZE_BY_LOADING_FIELD]
     if loads:
         verified = f"{measure.primary_output}_unstable"

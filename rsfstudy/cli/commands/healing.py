@@ -90,12 +90,13 @@ def healing(command_options: options.CommandOptions) -> int:
     """Measure frictional healing in the holds of RECORD.
 
     The command prints one row per hold with its duration, the friction before the hold, the peak
-    friction on reloading, healing and relaxation. The standard errors include the correlation of
-    the noise. The healing rate is the increase in healing per decade of hold duration. The command
-    also prints the stiffness of the machine. The holds are written to a figure and a data file.
+    friction on reloading, healing and relaxation. The standard errors account for the correlation
+    of the noise. The healing rate is the increase in healing per decade of hold duration. The
+    command also prints the stiffness of the machine. The holds are written to a figure and a data
+    file.
 
-    The exit status is 1 if no hold has a peak of friction on reloading, and 2 if the command line
-    is invalid. Otherwise the exit status is 0.
+    The exit status is 1 if friction does not reach a peak on reloading after any of the holds, and
+    2 if the command line is invalid. Otherwise the exit status is 0.
     """
     from rsfstudy.cli.figure_files import write_figure
     from rsfstudy.cli.overwrite_checks import check_output_may_be_replaced
