@@ -228,7 +228,7 @@ class RecordView(ExplorerView):
             self._discard_outdated_fit()
 
     def _select_fit_window(self, start_time: float | None, end_time: float | None) -> None:
-        """Select the rows between two times in s for the fit."""
+        """Restrict the fit to the rows between two times, which are given in s."""
         with self._ignore_widget_changes():
             self._widgets["begin"].value, self._widgets["end"].value = start_time, end_time
         self._detect_and_show_steps_in_window()

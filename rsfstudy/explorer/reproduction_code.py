@@ -69,7 +69,7 @@ def format_selection_as_python_code(
     recomputed_cell: RecomputedCell | None,
     cell_coordinates: Mapping[str, Any] | None,
 ) -> str:
-    """Write Python code that prints the numbers of a selection and draws its figure.
+    """Return Python code that prints the selected numbers and plots them.
 
     Parameters
     ----------

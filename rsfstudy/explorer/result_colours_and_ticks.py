@@ -88,7 +88,7 @@ def set_tick_labels(axis: Any, label_by_value: dict[Any, str]) -> None:
 
 
 def build_ticker_and_labels(label_by_value: dict[Any, str]) -> tuple[FixedTicker, dict[Any, str]]:
-    """Return the ticker and the tick labels of named values."""
+    """Return the ticker and the tick labels of an axis whose values have names."""
     return FixedTicker(ticks=list(label_by_value)), {
         int(value): name for value, name in label_by_value.items()
     }

@@ -184,7 +184,7 @@ class ResultPlot(ABC):
 def _build_status_symbol_columns(
     marker_by_status: dict[int, str], status_marks: CellStatusMarks, x: Any, y: Any
 ) -> dict[str, Any]:
-    """Return the data source columns of the status symbols."""
+    """Return the columns of the data source from which the status symbols are drawn."""
     failed = status_marks.status_codes >= int(Status.WORK_BUDGET_SPENT)
     codes = status_marks.status_codes.tolist()
     return {
@@ -201,7 +201,7 @@ class CurvesPlot(ResultPlot):
     """Plot of curves with error bars, and with status symbols at the bottom."""
 
     def choose_y_axis_type(self, dataset: xr.Dataset, panel: PlotSelection) -> str:
-        """Return "log" if all values of the variable are positive and span decades."""
+        """Return "log" if the values are positive and span at least two decades."""
         is_log = are_positive_and_span_decades(dataset[panel.variable].values)
         return "log" if is_log and not find_used_flag_names(dataset, panel.variable) else "linear"
 

@@ -239,7 +239,7 @@ class ResultsView(ExplorerView):
     def _show_selection(self, selection: PlotSelection) -> None:
         """Show another selection.
 
-        If the selections differ only in their points, the existing figures are updated.
+        If only the points of fixed dimensions have changed, the existing figures are updated.
         """
         old, self.selection = self.selection, selection
         self.hide_error()

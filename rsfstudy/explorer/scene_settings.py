@@ -251,7 +251,7 @@ class SceneSettings:
 
 
 def choose_fastest_engine() -> str:
-    """Return the compiled engine if Numba is installed, and SciPy otherwise."""
+    """Return the compiled engine if Numba is installed, and the SciPy engine otherwise."""
     return "compiled" if find_spec("numba") else "scipy"
 
 

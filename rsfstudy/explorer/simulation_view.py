@@ -211,7 +211,7 @@ class SimulationView(ExplorerView):
         return [self._preset, self._controls.column, self._duration]
 
     def list_plot_panes(self) -> list[Any]:
-        """Return the description of the stability, the peak values and the plots."""
+        """Return panes that describe the stability, list the peak values and plot the motion."""
         grid = pn.Column(
             *map(pn.pane.Bokeh, self._figures.values()),
             sizing_mode="stretch_width", styles=_TWO_COLUMN_GRID_STYLE,

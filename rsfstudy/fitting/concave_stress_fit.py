@@ -160,7 +160,7 @@ def measure_stress_extrema(
     adjacent_drop_times: tuple[float, float],
     noise_sd: float,
 ) -> tuple[FittedStressDrop, np.ndarray]:
-    """Replace the stresses of a fitted drop by the highest and the lowest stress.
+    """Replace the start and end stresses of a drop by the highest and lowest stress.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def measure_stress_extrema(
 def _fit_longest_concave_part(
     time: np.ndarray, stress: np.ndarray, limits: tuple[float, float, float]
 ) -> _ConcaveFit | None:
-    """Find the longest range of samples that a concave function describes, and fit the function.
+    """Fit a concave function to the longest range of samples that it can describe.
 
     The initial range of samples begins midway between the previous drop and this drop, and ends at
     the middle of this drop. The number of samples before the drop is halved until a concave
@@ -266,8 +266,8 @@ def _fit_longest_concave_part(
 def _estimate_noise_variances(stress: np.ndarray) -> list[float]:
     """Estimate the variance of the noise from second differences.
 
-    A constant loading rate cancels in the second differences. Correlated noise increases the
-    variance of block means.
+    The second differences remove the stress increase due to a constant loading rate. If the noise
+    is correlated, the means of blocks of samples have a larger variance.
 
     Returns
     -------

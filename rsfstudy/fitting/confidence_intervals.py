@@ -193,12 +193,12 @@ class LikelihoodProfile:
         return float(self.best_coordinates[self.parameter_index] + direction_sign * at)
 
     def compute_twice_log_likelihood_decrease(self, fit_coordinate: float) -> float:
-        """Compute twice the decrease in the log-likelihood from the best value of a parameter.
+        """Compute twice the decrease in the log-likelihood from its maximum.
 
-        This quantity is the squared distance between a given value of the parameter and the best
-        value. The squared distance is equal to the increase in the sum of squared residuals,
-        divided by the noise variance. If the log-likelihood is nearly quadratic, the method returns
-        the quadratic approximation.
+        The log-likelihood is evaluated at a given value of the parameter. Twice its decrease is
+        used as the squared distance between this value and the best value. The squared distance is
+        equal to the increase in the sum of squared residuals, divided by the noise variance. If the
+        log-likelihood is nearly quadratic, the method returns the quadratic approximation.
 
         Parameters
         ----------

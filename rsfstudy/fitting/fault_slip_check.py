@@ -63,7 +63,7 @@ def displacement_is_slip(
 
 
 def _compute_residual_squares_of_two_lines(time: np.ndarray, displacement: np.ndarray) -> float:
-    """Return the least sum of squared residuals of two connected straight lines."""
+    """Fit two connected straight lines, and return the sum of squared residuals."""
     scaled = (time - time[0]) / (time[-1] - time[0])
     centred = displacement - displacement.mean()
 

@@ -83,9 +83,9 @@ def detect_undeclared_filter(
     shortest_interval = min(float(np.diff(time[rows]).min()) for rows in windows)
 
     def describe(kind: str, size: float) -> tuple[float, float]:
-        """Return the AIC of a model with a filter, and the largest change in a parameter.
+        """Return the AIC of a model with a filter, and the largest resulting parameter change.
 
-        Each change in a parameter is divided by the standard error of the parameter.
+        The change in each parameter is divided by the standard error of the parameter.
         """
         parts = [
             _apply_filter_to_columns(kind, size, time[rows], columns[rows]) for rows in windows

@@ -105,7 +105,7 @@ def build_fit_outputs(
 
 
 def _iterate_outputs_of_parameter(parameter_name: str) -> Iterator[Output]:
-    """Describe the outputs of a parameter and of its errors."""
+    """Describe the outputs that contain a parameter and its errors."""
     about = PARAMETERS[strip_window_number(parameter_name)]
     optional = strip_window_number(parameter_name) in LAW_SPECIFIC_PARAMETERS
     yield Output(

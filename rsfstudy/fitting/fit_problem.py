@@ -307,7 +307,7 @@ class FitProblem:
         return found
 
     def _find_initial_fit_coordinates(self) -> np.ndarray:
-        """Return the initial coordinates, with the best of several tested slip distances.
+        """Return the initial coordinates, after choosing the best of several slip distances.
 
         The best slip distance is the slip distance with the smallest sum of squared residuals.
         """
@@ -513,7 +513,7 @@ class FitProblem:
         whitened_jacobian_and_residuals: np.ndarray,
         noise_model: NoiseModel,
     ) -> np.ndarray:
-        """Return the covariance due to the standard error of a fixed stiffness."""
+        """Return the parameter covariance that is caused by the error of a fixed stiffness."""
         if not (self.stiffness_relative_stderr and np.isfinite(inverse_normal_matrix).all()):
             return np.zeros_like(inverse_normal_matrix)
         by_stiffness = self.stiffness_relative_stderr * self.model.compute_jacobian(
@@ -529,11 +529,11 @@ class FitProblem:
     def _compute_aic_without_step_response(
         self, jacobian: np.ndarray, noise_model: NoiseModel
     ) -> float:
-        """Compute the AIC of a model without a response to the steps.
+        """Compute the AIC of a model in which friction does not respond to the steps.
 
-        The model without a response contains only trends and has a = b = 0. The computation uses
-        the noise model of the fit, because a newly estimated noise model would describe the
-        response to the steps as correlated noise.
+        In this model, friction has only trends, and the parameters a and b are zero. The
+        computation uses the noise model of the fit, because a newly estimated noise model would
+        describe the response to the steps as correlated noise.
         """
         linear = [self.model.is_linear_in_parameter(name) for name in self.free_parameters]
         columns = np.column_stack([jacobian[:, linear], self.model.recorded_friction])

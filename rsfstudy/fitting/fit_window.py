@@ -260,8 +260,8 @@ class FitWindow:
     def _compute_earliest_start_time(self, step: LoadingStep) -> float:
         """Return the earliest time in s at which a window can start.
 
-        If friction before the step is not linear, the window begins later than the earliest
-        possible start.
+        If friction before the step is not a linear function of time, the window begins later than
+        the returned time.
         """
         record = self.record
         earlier = [s.end for s in record.loading_steps if s.end < step.start]
@@ -411,7 +411,7 @@ class FitWindow:
 
 @lru_cache(maxsize=256)
 def _find_start_of_linear_friction(record: Record, start_time: float, end_time: float) -> float:
-    """Find the time at which the linear part of friction before a step begins."""
+    """Find the time from which friction is a linear function of time until a step."""
     return find_start_of_linear_friction(
         record.time, record.columns["friction"], start_time, end_time
     )

@@ -96,7 +96,7 @@ def build_hold_table(
 def fit_healing_rate(
     durations: np.ndarray, healing: np.ndarray, covariance: np.ndarray
 ) -> tuple[float, float, float]:
-    """Fit a line to healing against the decimal logarithm of the hold duration.
+    """Fit healing as a linear function of the decimal logarithm of the hold duration.
 
     Parameters
     ----------

@@ -292,7 +292,7 @@ class SegmentBoundaryRefinement:
     def _limit_rows(
         self, start_row: int, first_boundary: int, last_boundary: int, stop_row: int
     ) -> tuple[int, int]:
-        """Limit a range to at most ``max_rows`` rows before and after its boundaries."""
+        """Limit a range to ``max_rows`` rows before the first and after the last boundary."""
         return (
             max(start_row, first_boundary - self.max_rows),
             min(stop_row, last_boundary + self.max_rows),
@@ -316,7 +316,8 @@ class SegmentBoundaryRefinement:
 
         If the residuals of the best two lines are much larger than the noise, the boundary is not
         moved. In this case, slow deviations from the lines, such as periodic errors of a drive
-        screw, dominate the sum of squares, and its minimum may be far from the change in slope.
+        screw, dominate the sum of squares. The boundary with the smallest sum may then be far from
+        the change in slope.
         """
         i, j = self._limit_rows(start_row, boundary, boundary, stop_row)
         at, sums = np.arange(MIN_SEGMENT_ROWS, j - i - MIN_SEGMENT_ROWS + 1), self._sum(i, j)

@@ -36,7 +36,7 @@ _MAX_CORRELATION_OF_BLOCK_AVERAGES = 0.98
 def find_start_of_linear_friction(
     record_time: np.ndarray, record_friction: np.ndarray, start_time: float, end_time: float
 ) -> float:
-    """Find the time at which the linear part of friction before a step begins.
+    """Find the time from which friction is a linear function of time until a step.
 
     Rows at the beginning of the tested interval are discarded if two conditions are met. First, two
     separate lines must fit friction far better than a single line. The comparison of the two fits
@@ -78,7 +78,7 @@ def find_start_of_linear_friction(
 
 
 def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
-    """Find the row that divides friction into the two lines with the smallest residuals.
+    """Fit two lines to friction, and find the row at which the second line should begin.
 
     Returns
     -------

@@ -36,7 +36,7 @@ def copy_steps_shifted_by_their_errors(
 ) -> list[list[LoadingStep]]:
     """Return copies of the steps with shifted times and velocities.
 
-    The covariance matrix of the step times and velocities can be written as a sum over
+    The errors of the step times and velocities are correlated, but they can be written as a sum of
     statistically independent errors. In each copy of the steps, the step times and velocities are
     shifted by 1 % of one independent error.
 
@@ -157,7 +157,7 @@ def _compute_step_time_and_velocity_errors(
 def _compute_covariance_root_from_noise(
     time: np.ndarray, jacobian_and_residual_columns: np.ndarray
 ) -> np.ndarray:
-    """Compute a square root of the covariance matrix for random noise.
+    """Compute a square root of the covariance matrix of errors due to random noise.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _compute_covariance_root_from_rounding(
     row_segments: np.ndarray,
     rounding_quantum: float,
 ) -> np.ndarray:
-    """Compute a square root of the covariance matrix for rounded displacement.
+    """Compute a square root of the covariance matrix of errors due to rounding.
 
     At a constant velocity, the rounding errors are periodic rather than random. However, the phase
     of the rounding errors is arbitrary in each straight segment. The function therefore fits lines

@@ -153,7 +153,7 @@ def choose_longest_polynomial_window(
     degree: int,
     noise_reference_fit: GeneralisedLeastSquaresFit,
 ) -> tuple[np.ndarray, bool]:
-    """Select the longest window that a polynomial describes within the noise.
+    """Select the longest window in which a polynomial fits the values within the noise.
 
     Parameters
     ----------

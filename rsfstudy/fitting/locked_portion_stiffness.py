@@ -385,7 +385,9 @@ def _compute_friction_while_locked(
 ) -> np.ndarray:
     """Compute friction of an almost locked fault.
 
-    The parameters are friction at x = 0, ln k, ln |v|, ln a and g.
+    The parameters are friction at zero displacement, ln k, ln |v|, ln a and g, where k is the
+    stiffness divided by normal stress, v is the slip rate ratio, a is the direct effect and g is a
+    constant.
     """
     level, log_k, log_rate, log_a, g = parameters.tolist()
     k, a = math.exp(log_k), math.exp(log_a)

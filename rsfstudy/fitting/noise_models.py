@@ -271,7 +271,7 @@ class NoiseModel:
 
 
 def build_white_noise_model(time: np.ndarray) -> NoiseModel:
-    """Return white noise with one noise level for each sampling interval.
+    """Return a white noise model with one noise level for each sampling interval.
 
     Parameters
     ----------

@@ -58,9 +58,9 @@ def find_non_outlier_mask(
     The function compares each residual with the median of the neighbouring residuals. A row is an
     outlier if its residual differs from this median by more than six local standard deviations. The
     function also compares the model friction of each row with the median model friction of the
-    neighbouring rows. The deviation of the residual from its median must be more than twice the
-    largest deviation of the model friction in nearby rows. This second condition is necessary
-    because a misfit at a peak of the model is not an outlier.
+    neighbouring rows. The difference between the residual and the median residual must be more than
+    twice the largest such difference of the model friction in nearby rows. This second condition is
+    necessary because a misfit at a peak of the model is not an outlier.
 
     Parameters
     ----------

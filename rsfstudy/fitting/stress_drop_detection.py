@@ -354,7 +354,7 @@ class _WindowMeanDifferences:
     def find_drops_not_clearer_in_longer_windows(
         self, longer_windows: list[_WindowMeanDifferences]
     ) -> list[tuple[int, int]]:
-        """Find the drops whose detection scores are not clearly higher in longer windows.
+        """Find the drops that longer windows do not detect with clearly higher scores.
 
         Parameters
         ----------

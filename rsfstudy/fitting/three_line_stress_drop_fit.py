@@ -312,10 +312,10 @@ def _fit_three_connected_lines(
 
     The coefficients of a fit are the stresses at the start and the end of the drop, and the slopes
     before and after the drop. A pair of start and end times is rejected if it covers only a
-    fraction of a longer drop. Such a pair is recognised by a fast stress decrease outside the drop,
-    with a rate of more than 0.3 times the rate during the drop. The slope on each side of the drop
-    predicts a stress decrease on the other side. A pair of times is also rejected if the actual
-    decrease exceeds the predicted decrease by more than half of the drop size.
+    fraction of a longer drop. This is the case if stress decreases outside the drop more than 0.3
+    times as fast as during the drop. A pair is also rejected if stress decreases much more on one
+    side of the drop than predicted by the slope on the other side. The limit for this difference is
+    half of the drop size.
     """
     t0, t1 = corner_time_pairs[:, :1], corner_time_pairs[:, 1:]
     share = np.clip((time - t0) / (t1 - t0), 0.0, 1.0)

@@ -551,7 +551,7 @@ class WindowModel:
     def _find_typical_parameter_size(
         self, parameter_name: str, parameter_values: ParameterValues
     ) -> float:
-        """Return the parameter scale for the step size of finite differences."""
+        """Return the scale that determines the finite-difference step size of a parameter."""
         if parameter_name in LOGARITHMIC_PARAMETERS:
             return 1.0
         if parameter_name == "a":

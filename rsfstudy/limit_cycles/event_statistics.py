@@ -256,7 +256,7 @@ class EventStatistics(Measure):
     def _iterate_events_of_noisy_motion(
         self, scene: Scene, integrator: Integrator
     ) -> Iterator[_SlipEvent]:
-        """Yield the events of a scene with noise, detected with two levels of slip rate."""
+        """Yield the slip events of a scene with noise, using two slip rates as thresholds."""
         arrest = scene.log_load_velocity
         asked = (
             rise("log_slip_rate", arrest),
@@ -289,19 +289,19 @@ def _iterate_events_of_noiseless_motion(
 
 
 def _list_recurrence_intervals_and_drops(events: list[_SlipEvent]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the recurrence intervals, and the stress drops of the events that end them."""
+    """Return the recurrence intervals, and the stress drop at the end of each interval."""
     intervals = [after.start_time - before.start_time for before, after in pairwise(events)]
     return np.array(intervals), np.array([event.static_stress_drop for event in events[1:]])
 
 
 def _compute_moments(samples: np.ndarray) -> tuple[float, float, float]:
-    """Return the mean, the standard deviation and the coefficient of variation."""
+    """Return the mean, the standard deviation and the coefficient of variation of samples."""
     mean, deviation = float(samples.mean()), float(samples.std(ddof=1))
     return mean, deviation, deviation / mean
 
 
 def _compute_moment_standard_errors(samples: np.ndarray) -> tuple[float, float, float]:
-    """Return the standard errors of the moments of independent samples."""
+    """Return standard errors of the results of _compute_moments for independent samples."""
     _mean, deviation, variation = _compute_moments(samples)
     count, centred = len(samples), samples - samples.mean()
     variance = float(np.mean(centred**2))

@@ -326,7 +326,7 @@ class LimitCycle(RecordingMeasure):
 
 
 def _describe_several_events_per_period(orbit: PeriodicOrbit) -> str:
-    """Return a message for an orbit of several events, and otherwise an empty string."""
+    """Return a message if the orbit contains several events, and otherwise an empty string."""
     if orbit.period_in_cycles == 1:
         return ""
     period = math.fsum(cycle.recurrence_interval for cycle in orbit.cycles)
@@ -503,7 +503,7 @@ def _compute_additional_cycle_outputs(scene: Scene, cycle: StickSlipCycle) -> di
 
 
 def _compute_healing_exponent(scene: Scene, cycle: StickSlipCycle) -> float:
-    """Return d ln(theta)/d ln(V) between slip arrest and the lowest slip rate.
+    """Return the mean slope d ln(theta)/d ln(V) between slip arrest and the lowest slip rate.
 
     The result is NaN if the law has no state variable Theta = b ln(theta/theta_*).
     """

@@ -246,9 +246,9 @@ class LimitCycleSearch:
     def _has_converged(self) -> bool:
         """Return True if the last cycle is close enough to the limit cycle.
 
-        The cycles have converged if the derivatives of the return map predict a sufficiently small
-        difference between the results of the last cycle and of the limit cycle, or if the last two
-        cycles agree.
+        The return map derivatives predict how much the results of the last cycle differ from the
+        results of the limit cycle. The cycles have converged if this difference is sufficiently
+        small, or if the last two cycles agree.
         """
         tolerance = self._integrator.result_tolerance(0.3)
         allowed = [tolerance * abs(number) for number in self._image[2:]]
@@ -407,7 +407,7 @@ def _may_still_converge(cycles: Sequence[StickSlipCycle]) -> bool:
 
 
 def _list_state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
-    """Return the sets of state indices that are compared to detect a period.
+    """Return the sets of states (as indices) that are compared to detect a period.
 
     The first set contains the states used for the distance from steady sliding. The second set
     contains only the states of the friction law, because a slow unknown of the fluid may converge

@@ -175,7 +175,7 @@ def extract_section_coordinates(motion_point: MotionPoint) -> np.ndarray:
 
 
 def extract_section_and_outputs_at_cycle_end(cycle: StickSlipCycle) -> np.ndarray:
-    """Return an array of the section at the end of a cycle and the results of the cycle.
+    """Return an array that contains the section at the end of a cycle and the main results.
 
     Parameters
     ----------
@@ -392,11 +392,11 @@ class ReturnMap:
     def compute_motion_direction_and_image_change(
         self, motion_point: MotionPoint
     ) -> tuple[FloatTuple, FloatTuple]:
-        """Compute the direction of the motion at a section, and the resulting image change.
+        """Compute how a section changes along the motion, and the resulting change of its image.
 
-        The image change is the change in the next section and in the main results if the section is
-        displaced along the motion. If the effect of inertia is small, a displacement along the
-        motion changes only the duration of the cycle.
+        The image of a section consists of the next section and the main results. The image changes
+        if the section is displaced along the motion. If the effect of inertia is small, a
+        displacement along the motion changes only the duration of the cycle.
 
         Parameters
         ----------
@@ -593,7 +593,7 @@ class ReturnMap:
     def _compute_largest_scaled_section_change(
         self, section_change: np.ndarray, section: np.ndarray, state_scale: float
     ) -> float:
-        """Return the largest scaled component of a change in a section.
+        """Scale the components of a section change, and return the largest absolute value.
 
         The unknowns of a fluid may have large values. If a fluid unknown exceeds the scale of the
         states, the change in the unknown is therefore divided by the ratio of the unknown to the

@@ -292,7 +292,7 @@ def _build_cycle_from_events(
 
 
 def _find_slip_arrest_point(events: Sequence[Event]) -> MotionPoint | None:
-    """Return the first point after the rupture at which friction balances the spring.
+    """Return the first point after the rupture at which friction balances the spring stress.
 
     The result is None if the cycle has no such point.
     """

@@ -247,7 +247,7 @@ class Elasticities(Measure):
         }
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the main result of the inner measure and its elasticities.
+        """Compute the main result of the inner measure, and the elasticities of this result.
 
         If the main result is zero, the status is ``not_applicable``, because zero has no logarithm.
 

@@ -30,7 +30,7 @@ _REMEDY_FOR_FORMER_ARGUMENTS = (
 
 
 def accept_deprecated_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
-    """Make a function with the argument ``integrator`` accept the deprecated arguments.
+    """Make a function that takes an ``integrator`` also accept the deprecated arguments.
 
     Parameters
     ----------

@@ -24,10 +24,10 @@ _NAN_FOR_UNEVALUATED_POINT_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
 def compute_initial_point(scene: Scene) -> MotionPoint:
     """Return the initial point of a motion, immediately after the loading step.
 
-    Before the loading step, the slider slides steadily at V_*, or has the initial stress and state
-    that the scene specifies. The loading step changes the spring stress and the imposed normal
-    stress. If the scene has inertia, the loading step does not change the slip rate immediately.
-    Instead, the slip rate adjusts to the loading step within the inertial time.
+    Before the loading step, the slider slides steadily at the slip rate V_*, or has the initial
+    stress and state that the scene specifies. The loading step changes the spring stress and the
+    imposed normal stress. If the scene has inertia, the loading step does not change the slip rate
+    immediately. Instead, the slip rate adjusts to the loading step within the inertial time.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def _reset_loading_unknowns(scene: Scene, states: FloatTuple) -> FloatTuple:
 def _find_specified_initial_states(
     scene: Scene, steady_states: FloatTuple
 ) -> tuple[FloatTuple, float]:
-    """Find the states and ln(V/V_*) that the initial stress and state of the scene imply.
+    """Compute the states and ln(V/V_*) from the initial stress and state of the scene.
 
     The function solves for the value of Psi that gives the specified state variable.
     """

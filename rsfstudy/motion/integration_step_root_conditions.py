@@ -114,9 +114,9 @@ def may_any_event_be_reported_later(workspace):
 
 
 def compute_excess_over_switch_threshold(motion, workspace, point_columns):
-    """Return the relative excess of the inertia effect over its limit.
+    """Return the ratio of the inertia effect to its limit, minus 1.
 
-    A non-negative excess means that the motion must leave the slow manifold. In ruptures, and for
+    If the result is zero or positive, the motion must leave the slow manifold. In ruptures, and for
     motions without inertia, the function returns -1.
 
     Parameters

@@ -128,8 +128,8 @@ def repeat_step_to_segment_end_time(motion, workspace, independent_variable):
 
     If numerical stability limits the step size, the dense output is much less accurate than the
     solution at the end of the step. The function therefore repeats the step more than once. After
-    each repetition, the estimate is corrected for the remaining time between the end of the step
-    and the end of the segment.
+    each repetition, the function corrects ``independent_variable`` for the remaining time between
+    the end of the step and the end of the segment.
 
     Parameters
     ----------

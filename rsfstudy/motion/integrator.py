@@ -199,7 +199,7 @@ class Integrator:
         return self if self.rtol >= rtol else self.with_rtol(rtol)
 
     def result_tolerance(self, factor: float = 1.0) -> float:
-        """Return a multiple of the requested relative error of the main results.
+        """Return the relative tolerance of the main results, multiplied by a factor.
 
         Parameters
         ----------

@@ -126,7 +126,7 @@ def compute_slip_rate_norm(
 def compute_inertia_effect_over_limit(
     log_slip_rate: float, inertial_stress: float, switch_thresholds: RegimeSwitchThresholds
 ) -> float:
-    r"""Compute the effect of inertia, divided by its limit on the slow manifold.
+    r"""Compute the ratio of the inertia effect to its limit on the slow manifold.
 
     Parameters
     ----------

@@ -175,7 +175,7 @@ class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
     """
 
     def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        """Return a cache key that does not depend on the values of the closure."""
+        """Return a cache key that does not depend on the values of closure variables."""
         return signature, codegen.magic_tuple()
 
 
