@@ -40,8 +40,8 @@ def copy_with_cf_encoding(dataset: xr.Dataset) -> xr.Dataset:
     """Return a copy of a dataset whose encoding omits unwanted fill values.
 
     The method ``to_netcdf`` of the copy writes no fill values for coordinates, flags and counts.
-    The encoding belongs to the variables, so selections and renamed copies of the dataset keep the
-    encoding.
+    The encoding is stored with the variables, so selections and renamed copies of the dataset keep
+    the encoding.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ class ObjectDigest:
             self._sha256.update(text.encode(errors="surrogatepass") + b"\0")
 
     def _register_if_first_visit(self, key: Hashable, value: Any) -> bool:
-        """Return True for a new object. For a known object, add its number to the digest."""
+        """Return True for a new object. If the object is known, add its number to the digest."""
         if key in self._visited:
             self._add_texts(f"object {self._visited[key][0]}")
             return False
@@ -137,7 +137,7 @@ class ObjectDigest:
             self._add_state_of_instance(value, used_names)
 
     def _add_module(self, module: ModuleType, used_names: Iterable[str]) -> None:
-        """Add to the digest the module members that are used in the code."""
+        """Add to the digest all module members that the code uses."""
         if not self._reads_module(module.__name__):
             self._add_texts(module.__name__)
         elif self._register_if_first_visit((id(module), *used_names), module):

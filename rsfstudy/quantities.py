@@ -437,7 +437,7 @@ def format_unit_as_html(quantity: Quantity) -> HtmlText:
 
 
 def _find_html_character(latex_command: str) -> str:
-    """Return the character of a LaTeX command.
+    """Return the character that a LaTeX command represents.
 
     LaTeX and HTML use the same names for many letters and signs. Function names are returned
     unchanged, and unknown commands are removed.
@@ -467,7 +467,7 @@ def _format_html_table_cell(value: Any) -> str:
 
 
 def replace_comment_on_scales(attributes: Mapping[Any, Any], replacement: str) -> dict[Any, Any]:
-    """Replace a comment on the ``scale`` attributes after these attributes were removed.
+    """Replace a comment that describes the ``scale`` attributes, which have been removed.
 
     Parameters
     ----------

@@ -118,7 +118,7 @@ class WorkMeter:
     def charge_work_since_last_call(
         self, regime_names: Sequence[str], work_before: Sequence[int], work_now: Sequence[int]
     ) -> int:
-        """Count the evaluations and steps of a motion since the previous call.
+        """Count the evaluations and steps that a motion has needed since the previous call.
 
         Parameters
         ----------

@@ -157,7 +157,7 @@ def list_numeric_result_variables(dataset: xr.Dataset) -> list[str]:
 
 
 def list_primary_and_varying_variables(dataset: xr.Dataset) -> list[str]:
-    """Return the names of the primary output and of the variables that vary.
+    """Return the names of the primary output and of the other variables that vary.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def are_log_spaced(points: np.ndarray) -> bool:
 
 
 def are_positive_and_span_decades(values: np.ndarray) -> bool:
-    """Return True if all values are positive and span a factor of 100.
+    """Return True if all values are positive and span more than two orders of magnitude.
 
     Parameters
     ----------
@@ -467,7 +467,7 @@ def label_rows(axes: Axes, names: list[str], width: int = 60) -> None:
 
 
 def compute_point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
-    """Return the colours of the points of a numeric dimension.
+    """Return one colour for each point of a numeric dimension.
 
     Parameters
     ----------

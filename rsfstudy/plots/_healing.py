@@ -39,7 +39,7 @@ _ERROR_BAR_HALF_LENGTH_IN_STDERRS = 2.0
 def plot_healing(
     table: xr.Dataset, record: Record | None = None, *, style: Any = None, width: Any = None
 ) -> Figure:
-    """Plot healing and relaxation against the duration of holds.
+    """Plot healing and relaxation against the hold duration.
 
     Parameters
     ----------

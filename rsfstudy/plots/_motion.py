@@ -189,7 +189,7 @@ def _check_motion_variables(motion: xr.Dataset, x_variable: str | None) -> None:
 
 
 def _find_normal_stress_variable_name(motion: xr.Dataset) -> str:
-    """Return the name of the normal stress variable of a motion."""
+    """Return the name of the variable that contains the normal stress of a motion."""
     return "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
 
 
@@ -210,7 +210,7 @@ def _choose_x_variable(motion: xr.Dataset) -> str:
 
 
 def _format_motion_title(motion: xr.Dataset) -> str:
-    """Return the title of a motion, with the status if the motion ended early."""
+    """Return the title of a motion, including the status if the motion ended early."""
     status = motion.attrs.get("status", "ok")
     ending = "" if status == "ok" else f" [{status}: {motion.attrs.get('message', '')}]"
     title = motion.attrs.get("title", "Limit cycle of a spring-slider")
@@ -280,7 +280,7 @@ def _compute_steady_state_friction(
 
 
 def _format_axis_label_of_variable(variable: xr.DataArray) -> str:
-    """Return the label of an axis from the attributes of a variable."""
+    """Build an axis label from the attributes of a variable."""
     name = str(variable.attrs.get("long_name", variable.name))
     name = name.removesuffix(" since the step") if "phase" in variable.dims else name
     name = f"{name[:1].upper()}{name[1:]}"

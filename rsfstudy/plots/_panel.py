@@ -133,7 +133,7 @@ def restrict_panel_to_point_of_extra_dims(
     own = {dimension: at for dimension, at in panel.isel.items() if dimension not in point_indices}
 
     def title(part: xr.Dataset) -> str:
-        """Return the title of the panel with the description of the point."""
+        """Return the title of the panel, including the description of the point."""
         return _join_and_capitalise_phrases(
             _evaluate_text_or_function(panel.title, part, _describe_selected_points(part, own)),
             title_suffix,
@@ -260,7 +260,7 @@ def iterate_curves_and_styles(
 
 
 def _choose_line_style_for_second_hue(point_number: int) -> dict[str, str]:
-    """Return line and marker fill styles for a point of the second ``hue`` axis."""
+    """Return the line style and the marker fill style for a point of the second ``hue`` axis."""
     line, fill = _LINE_AND_FILL_STYLES_OF_SECOND_HUE[
         point_number % len(_LINE_AND_FILL_STYLES_OF_SECOND_HUE)
     ]

@@ -45,7 +45,7 @@ _COLOUR_BAR_WIDTH_OVER_PANEL_WIDTH = 0.24
 @accept_former_keyword_names
 @contextlib.contextmanager
 def style_context(user_styles: Any = None, width: Any = None) -> Iterator[None]:
-    """Apply the style sheet of rsfstudy, any additional styles and the width of figures.
+    """Apply the style sheet of rsfstudy and any additional styles, and set the figure width.
 
     Parameters
     ----------
@@ -370,8 +370,8 @@ def _create_legend_that_fits_width(
 ) -> None:
     """Create a legend with as many columns as fit into a given width.
 
-    The width is in pixels. Matplotlib fills the columns of a legend one after another, so the
-    function reorders the entries so that they can be read row by row.
+    The width is in pixels. Matplotlib fills the columns of a legend one after another. The function
+    therefore reorders the entries so that they can be read row by row.
     """
     for beside in range(min(max_columns, len(handles_by_label)), 0, -1):
         texts = [

@@ -279,7 +279,7 @@ def format_number(value: float, digits: int = 3) -> str:
 
 
 def format_value_with_error(value: float, error: float, max_decimals: int | None = None) -> str:
-    r"""Format a value and its error, rounded to the first digit of the error.
+    r"""Format a value and its error, rounded to the first significant digit of the error.
 
     The formatted value has at least one decimal place.
 

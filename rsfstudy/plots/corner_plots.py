@@ -183,7 +183,7 @@ def _build_triangle(
     variable_names: Sequence[str],
     omitted_names: Sequence[str],
 ) -> CornerFigure:
-    """Build the corner plot of variables, with a note that lists the omitted variables."""
+    """Build the corner plot of several variables, and add a note that lists omitted variables."""
     panels = [
         _build_scatter_or_histogram_panel(
             dataset,
@@ -211,7 +211,7 @@ def _write_note_on_omitted_variables(
 
 
 def _list_sampled_fields_by_dimension(dataset: xr.Dataset) -> dict[str, list[str]]:
-    """Return a mapping from the dimensions of axes with numbered points to field names."""
+    """Return the field names of each dimension that has numbered points."""
     found: dict[str, list[str]] = {}
     for axis in (stored.build_axis() for stored in StoredDataset(dataset).study_declaration.axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
@@ -264,8 +264,8 @@ def _build_scatter_or_histogram_panel(
 def _format_short_axis_label(dataset: xr.Dataset, variable_name: str) -> str:
     """Return an axis label with a symbol and units, broken into short lines.
 
-    The lines of the label are short because the panels are small. In addition, matplotlib writes
-    the power of ten of the tick labels next to the first line of the label.
+    The lines of the label are short because the panels are small, and because matplotlib writes the
+    power of ten of the tick labels next to the first line.
     """
     about = find_quantity(
         variable_name.removesuffix("_error"), read_quantities_not_in_vocabulary(dataset)

@@ -318,7 +318,7 @@ def _format_correlation_title(dataset: xr.Dataset, law_numbers: Sequence[int] = 
 
 
 def _format_parameter_symbol(parameter_name: str) -> str:
-    """Return the symbol of a parameter, including the window number in its name, if any."""
+    """Return the symbol of a parameter, with the window number if the name contains a number."""
     plain, number = split_window_number(parameter_name)
     symbol = PARAMETERS[plain].symbol
     return f"{symbol[:-1]}^{{({number})}}$" if number else symbol

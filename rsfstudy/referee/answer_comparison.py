@@ -266,8 +266,8 @@ def compare_answers(
 def round_digit_count_down(digit_count: float) -> float:
     """Round a number of digits down to one decimal place.
 
-    An answer fails if it has fewer correct digits than required. Because the number is rounded
-    down, the displayed number is then also less than the required number.
+    An answer fails if it has fewer correct digits than required. Rounding down ensures that the
+    displayed number of digits of a failed answer is also below the required number.
 
     Parameters
     ----------

@@ -187,7 +187,7 @@ def _convert_column_to_si(
 
 
 def _find_last_place_unit(values: np.ndarray) -> float:
-    """Return the value of one unit in the last decimal place of an array.
+    """Return the size of one unit in the last decimal place of the given numbers.
 
     The result is 1 if all numbers are integers, and 0 if all numbers are zero.
     """

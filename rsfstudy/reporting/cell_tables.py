@@ -120,7 +120,7 @@ def format_status_counts(dataset: xr.Dataset) -> str:
 
 
 def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
-    """Describe the failed cells and the reductions without results.
+    """Describe the failed cells, and the reductions that have no results.
 
     Parameters
     ----------

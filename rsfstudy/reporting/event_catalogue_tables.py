@@ -82,7 +82,7 @@ def build_record_events_tables_and_sentences(event_catalogue: xr.Dataset) -> lis
 
 
 def _format_event_value(event: xr.Dataset, name: str) -> str:
-    """Format a quantity of an event. Errors without a separate column are appended."""
+    """Format a quantity of an event, and append the error if it has no separate column."""
     value = format_number_or_dash(float(event[name]), ".4g")
     if name not in _VARIABLES_WITH_ERROR_IN_COLUMN or value == "-":
         return value

@@ -41,7 +41,7 @@ _MARK_OF_INVALID_STDERRS = "*"
 
 
 def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
-    """Yield tables of all fits, with remarks on each fit.
+    """Yield tables of all fits, and remarks on each fit.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
 
 
 def _describe_unfitted_step(record_and_step: str, fits: Sequence[xr.Dataset]) -> str:
-    """Return a sentence with the reason why no law was fitted to a step."""
+    """Return a sentence that explains why no law was fitted to a step."""
     reasons = {
         str(one["message"].item()) or find_status_label_of_fit(one).replace("_", " "): None
         for one in fits
@@ -144,7 +144,7 @@ def _build_parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> Text
 
 
 def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
-    """Return a table column with the parameters, quality and noise of a fit."""
+    """Build the table column that shows the parameters, quality and noise of a fit."""
     found = {
         n + _format_units_in_brackets(split_window_number(name)[0]): format_parameter_with_stderr(
             fit, name
@@ -255,10 +255,10 @@ def format_value_with_stderr(value: float, stderr: float) -> str:
 
 
 def _describe_wide_confidence_intervals(fit: xr.Dataset) -> Iterator[str]:
-    """Yield a sentence with the confidence intervals if the fit has few degrees of freedom.
+    """Yield a sentence that lists the confidence intervals if there are few degrees of freedom.
 
-    The intervals are then much wider than two standard errors. Fits with unconstrained parameters
-    or invalid standard errors are omitted.
+    The half-width of the intervals is then much larger than two standard errors. Fits with
+    unconstrained parameters or invalid standard errors are omitted.
     """
     freedom = fit["degrees_of_freedom"].item() if "degrees_of_freedom" in fit else math.nan
     half_width = float(student_t.ppf(0.975, freedom)) if freedom > 0.0 else math.nan

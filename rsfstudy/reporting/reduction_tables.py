@@ -51,7 +51,7 @@ _INTEGRATOR_COMPARISON_COLUMNS = (
 
 
 def build_reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
-    """Yield tables of the slopes of a study, and a comparison of integrators.
+    """Yield tables that list the slopes of a study and compare integrators.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def build_reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
 
 
 def _build_slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
-    """Return a table of a slope, with its standard error and largest deviation."""
+    """Return a table that lists a slope, its standard error and the largest deviation."""
     slope = dataset[reduction_name]
     units, description = format_units(slope), slope.attrs.get("comment", reduction_name)
     heading = f"{reduction_name} ({units})" if units != "1" else reduction_name

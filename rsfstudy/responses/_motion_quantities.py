@@ -20,7 +20,7 @@ MIN_SQUARED_DIRECTION_COSINE_OF_PATH = 1e-12
 def compute_distance_from_steady_sliding(
     scene: Scene, motion_point: MotionPoint, load_velocity: float
 ) -> float:
-    """Compute the distance of a point from steady sliding at a load point velocity.
+    """Compute the distance of a point from steady sliding at a given load point velocity.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def compute_distance_from_steady_sliding(
 def compute_log_slip_rate_slope_along_path(
     scene: Scene, event: Event, load_velocity: float
 ) -> float:
-    """Compute the growth rate of ln V at an event with respect to path length.
+    """Compute the growth rate of ln V with respect to path length at an event.
 
     During a rupture, path length is defined with inertial time instead of displacement. In this
     case, the growth rate is converted to the path length that is used between ruptures.
@@ -85,10 +85,10 @@ def compute_log_slip_rate_slope_along_path(
 
 
 def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
-    """Choose the quantity in which events of the friction coefficient are detected.
+    """Choose the quantity that is used to detect events of the friction coefficient.
 
     If normal stress is constant and the law is not regularised, the spring stress differs from the
-    friction coefficient only by a constant. The events are then detected in the spring stress.
+    friction coefficient only by a constant. In this case, the spring stress is used.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ class RecordedMotion(NamedTuple):
         return self.events_at_segment_starts[0]
 
     def get_neglected_inertia_error_until(self, time: float) -> float:
-        """Return the error of ln V that is caused by neglected inertia.
+        """Return the error of ln V that results from neglecting inertia.
 
         Parameters
         ----------
@@ -165,7 +165,7 @@ def record_motion_until_peak(
 def compute_motion_relative_to_start(
     start_event: Event, path_variables: Mapping[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """Return the quantities along a record relative to its beginning.
+    """Return quantities along a record, with time and slip measured from the beginning.
 
     Parameters
     ----------
@@ -199,8 +199,8 @@ def estimate_error_at_instant(
 
     If the machine is stiff, numerical stability limits the time steps. Two runs may then have the
     same error at a single instant by chance. The error estimate therefore also includes a small
-    fraction of the result, and the effect of a small error in the friction coefficient from which
-    the result is read.
+    fraction of the result, and the effect of a small error in the friction coefficient that
+    determines the result.
 
     Parameters
     ----------

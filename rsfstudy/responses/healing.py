@@ -260,7 +260,7 @@ class Healing(RecordingMeasure):
     def _compute_outputs_along_record(
         self, scene: Scene, recorded_motion: RecordedMotion
     ) -> dict[str, np.ndarray]:
-        """Return the quantities recorded since the start of the hold, along ``phase``."""
+        """Return the quantities since the start of the hold along the dimension ``phase``."""
         path = resample_motion_along_path(
             recorded_motion.recorded_rows, self.phases, MotionRecorder.RECORDED_VARIABLE_NAMES
         )

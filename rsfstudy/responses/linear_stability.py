@@ -153,10 +153,10 @@ class LinearStability(Measure):
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the critical stiffness, and the growth rate if requested.
 
-        The error estimate of the critical stiffness is the difference between the critical
-        stiffness from friction and the critical stiffness from growth rates. The error estimate of
-        the growth rate is the difference between the growth rate from friction and the growth rate
-        from the equations of motion.
+        The critical stiffness is computed from the linear response of friction, and again from the
+        condition that the growth rate is zero. The difference between the two results is the error
+        estimate. The growth rate is computed from the linear response of friction, and again from
+        the equations of motion, and its error is estimated in the same way.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ class LinearStability(Measure):
     def _compute_critical_stiffness(
         self, scene: Scene, steady_state: SteadySliding, integrator: Integrator
     ) -> Outcome:
-        """Compute the critical stiffness from friction and from growth rates."""
+        """Compute the critical stiffness, and verify that the growth rate there is zero."""
         load = steady_state.log_slip_rate
         sigma_ss = scene.compute_effective_normal_stress(steady_state.frictional_stress)
         mu_ss = (scene.mu_star + steady_state.frictional_stress) / sigma_ss

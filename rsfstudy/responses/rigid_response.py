@@ -142,8 +142,8 @@ class RigidResponse(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the evolution distance.
 
-        The scale is the sum of two terms: the evolution distance, and the change in evolution
-        distance that results from a change in friction equal to the direct effect parameter ``a``.
+        The scale is the sum of two terms: the evolution distance, and the change in the evolution
+        distance that results if friction changes by the direct effect parameter ``a``.
 
         Parameters
         ----------

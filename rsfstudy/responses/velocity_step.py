@@ -211,7 +211,7 @@ class VelocityStep(RecordingMeasure):
         """Return the scale of the numerical error of each result.
 
         The scale is the sum of two terms: the absolute value of the result, and the change in the
-        result due to a change in friction equal to the direct effect parameter ``a``.
+        result if friction changes by the direct effect parameter ``a``.
 
         Parameters
         ----------
@@ -235,10 +235,10 @@ class VelocityStep(RecordingMeasure):
     ) -> dict[str, float]:
         """Return the derivatives of the results with respect to friction.
 
-        The derivative is 1/ln r for a, b and a - b. The derivatives of the slip distances with
-        respect to friction are based on an exponential evolution of friction by the total amount
-        b ln r. At the point at which 1/e of this amount remains, friction changes by
-        b ln r/(e D_c) per unit of slip.
+        The derivative is 1/ln r for a, b and a - b. For the slip distances, the method assumes that
+        friction evolves exponentially with slip, by the total amount b ln r. When 1/e of this
+        amount remains, friction changes by b ln r/(e D_c) per unit slip, and the derivative is the
+        inverse of this rate.
         """
         evolved = values["apparent_b"] * log_velocity_ratio
         over_friction = math.e / evolved if evolved else math.nan
@@ -373,8 +373,8 @@ class VelocityStep(RecordingMeasure):
 
         At this event, the difference between friction and its final value is 1/e of the difference
         at the extremum of friction. The time and slip of the event are measured from this extremum.
-        A separate integration starts at the extremum of friction. A search of the recorded steps
-        could fail, because friction may cross the level of the event both before and after the
+        The method integrates the motion again from the extremum of friction. It does not search the
+        recorded steps, because friction may cross the level of the event both before and after the
         extremum within a single step.
         """
         peak = recorded_motion.peak_event
@@ -393,7 +393,7 @@ class VelocityStep(RecordingMeasure):
     def _compute_outputs_along_record(
         self, scene: Scene, evaluated_step: _EvaluatedVelocityStep, recorded_motion: RecordedMotion
     ) -> dict[str, float | np.ndarray]:
-        """Return the recorded quantities, the flag ``settled`` and the closed-form departure."""
+        """Return the recorded quantities, the flag ``settled`` and ``closed_form_departure``."""
         rows, friction = (
             recorded_motion.recorded_rows,
             MotionRecorder.get_friction_coefficient(recorded_motion.recorded_rows),

@@ -343,7 +343,7 @@ def derive_scene_fields_from_rig(
 
 
 def _derive_shear_heating_fields(rig: Mapping[str, Any]) -> dict[str, Any]:
-    """Compute the scene fields of shear heating and thermal pressurisation."""
+    """Compute the scene fields that describe shear heating and thermal pressurisation."""
     temperature, stress = rig["reference_temperature"], rig["normal_stress"]
     per_slip = rig["heat_capacity"] * rig["shear_zone_width"] * temperature
     width = rig.get("heat_loss_width", rig["shear_zone_width"])

@@ -295,7 +295,7 @@ def convert_scene_and_axes_to_rig_units(
 def replace_rig_quantity(
     rig: Rig, base_scene: Scene, quantity_name: str, value: Any
 ) -> tuple[Rig, Scene]:
-    """Return a rig and its scene after the value of one quantity has been replaced.
+    """Replace the value of one rig quantity, and return the new rig and the new scene.
 
     Parameters
     ----------

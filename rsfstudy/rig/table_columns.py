@@ -96,7 +96,7 @@ def check_heading_lengths(headings: Iterable[str], file_description: str) -> Non
 
 
 def _parse_column_selection_tuple(column_choice: Any) -> ColumnSelection:
-    """Parse a column selection with heading, units, scale and offset."""
+    """Parse a column selection that consists of a heading, units, a scale and an offset."""
     rule = "must be a heading, or a list with a heading, units, a scale and an offset"
     remedy = "Write, for example, ('Time (s)', 's', 0.001)."
     wrong = InvalidValue("column", column_choice, rule, remedy=remedy)

@@ -41,7 +41,7 @@ class ClosedForm:
 def compute_critical_stiffness(
     log_slip_rate: float, mu_star: float, a: float, b: float, cot_phi: float, alpha: float
 ) -> float:
-    r"""Compute the critical stiffness without inertia in closed form.
+    r"""Compute the critical stiffness of a slider without inertia from a closed-form equation.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def compute_coulomb_effective_friction(mu_star: float, b_over_a: float, alpha: f
 
 
 def compute_state_offset_at_instability(law_exponent: float, stiffness_ratio: float) -> float:
-    r"""Compute the offset from steady state at the onset of instability.
+    r"""Compute the offset of the state from steady state at the onset of instability.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def compute_state_offset_at_instability(law_exponent: float, stiffness_ratio: fl
 def compute_state_offset_after_stress_fall(
     mu_star: float, a: float, b_over_a: float, alpha: float, normal_stress_ratio: float
 ) -> float:
-    r"""Compute the offset from steady state after a drop of normal stress.
+    r"""Compute the offset of the state from steady state after a drop of normal stress.
 
     Parameters
     ----------

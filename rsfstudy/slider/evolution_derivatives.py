@@ -193,7 +193,7 @@ def _compute_central_differences_at_zero(
 def _compute_finite_difference_scales(
     scene: SceneView, steady_state: SteadySliding, stress_induced_state_shift: float
 ) -> list[float]:
-    """Return the scales of the finite differences in ln V, the shift and each state."""
+    """Return the scales of finite differences with respect to ln V, the shift and each state."""
     size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.steady_state_change_per_log_rate_over_a
     # If the law has several states, the sum of all b may be close to zero even if each b is large.
     of_shift = (

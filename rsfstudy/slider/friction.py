@@ -209,8 +209,8 @@ def _build_functions_of_frictional_stress(
 
     The argument ``kind_of_last_unknown`` is ``"pressure"``, ``"load point"`` or an empty string.
     This argument specifies the last element of the tuple of states. The function returns the first
-    three functions of ``FrictionFunctions``, and a function for the derivatives with respect to the
-    last unknown.
+    three functions of ``FrictionFunctions``, and a function that computes the derivatives with
+    respect to the last unknown.
     """
     effect = (
         reduce(friction_relation.build_sum_of_two_state_effects, state_effect_functions)
@@ -312,7 +312,7 @@ def build_state_evolution_function(
 def compute_steady_states(
     scene: SceneView, log_slip_rate: float, stress_induced_state_shift: float
 ) -> FloatTuple:
-    r"""Compute the states of steady sliding at a slip rate.
+    r"""Compute the states in steady sliding at a given slip rate.
 
     Parameters
     ----------

@@ -248,7 +248,7 @@ def extend_relation_to_reversed_slip(forward_relation: NumericFunction) -> Numer
 def build_strength_derivatives_by_pressure(
     normal_stress_function: NumericFunction, state_effect_function: NumericFunction
 ) -> NumericFunction:
-    r"""Return a function for the derivatives of strength with respect to pressure.
+    r"""Return a function that computes derivatives of strength with respect to pressure.
 
     The first argument is the function that computes the effective normal stress. The second
     argument is the function that computes the effect of stress on the state. The returned function
@@ -300,7 +300,7 @@ def add_load_point_oscillation_to_argument(friction_function: NumericFunction) -
 
 
 def build_strength_derivatives_by_load_point(strength_function: NumericFunction) -> NumericFunction:
-    """Return a function for derivatives with respect to the load point stress.
+    """Return a function that computes derivatives with respect to the load point stress.
 
     The argument is the function that computes the friction relation of the scene. The returned
     function ``(g, psis, p)`` computes the derivatives of strength and of the shift with respect to

@@ -135,7 +135,7 @@ def compute_linear_friction_response(
 def _compute_state_weights_in_friction(
     scene: SceneView, steady_state: SteadySliding
 ) -> tuple[list[float], dict[int, float]]:
-    """Return the weights of the states in friction, and derivatives of the state shift.
+    """Return the weight of each state in friction, and the derivatives of the state shift.
 
     The first returned value is a list with one weight per state. The second returned value is a
     dictionary with the derivatives of the shift (the decrease in the state variable due to stress

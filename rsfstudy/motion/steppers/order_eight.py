@@ -133,9 +133,10 @@ def step_to_segment_end(motion, workspace, approximate_length):
     """Take one step to the end of the loading segment.
 
     Time is the last unknown, and its value at the end of the segment is known. The function
-    therefore integrates this step with an independent variable that is proportional to time. At the
-    beginning of the step, the new independent variable advances at the same rate as the usual
-    independent variable. See ``Stepper.step_to_segment_end``.
+    therefore integrates this step with an independent variable that is proportional to time. The
+    constant of proportionality is chosen so that, at the beginning of the step, this variable
+    advances at the same rate as the usual independent variable. See
+    ``Stepper.step_to_segment_end``.
 
     Parameters
     ----------
@@ -170,7 +171,7 @@ def step_to_segment_end(motion, workspace, approximate_length):
 
 
 def take_step_with_time_as_variable(motion, workspace):
-    """Take one step with time as independent variable, and return its error ratio.
+    """Take one step with time as the independent variable, and return the error ratio.
 
     Parameters
     ----------
@@ -214,7 +215,7 @@ def take_step_with_time_as_variable(motion, workspace):
 
 
 def retake_step(motion, workspace, independent_variable):
-    """Repeat the step with an earlier end.
+    """Repeat the current step up to an earlier point.
 
     See ``Stepper.retake_step``.
 
@@ -237,7 +238,7 @@ def retake_step(motion, workspace, independent_variable):
 
 
 def interpolate_unknowns(motion, workspace, independent_variable):
-    """Interpolate the unknowns within the step with dense output.
+    """Use the dense output to interpolate the unknowns within the step.
 
     See ``Stepper.interpolate_unknowns``.
 

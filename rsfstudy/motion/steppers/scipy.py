@@ -191,7 +191,7 @@ class SciPyStepper(Stepper):
         initial_unknowns: np.ndarray,
         **first: float,
     ) -> OdeSolver:
-        """Create a solver whose right-hand side evaluations are counted."""
+        """Create a solver that counts evaluations of the right-hand side."""
         system = self.systems[motion.regime]
         rate_of, p, is_slow = system.rate_function, system.parameters, motion.regime == SLOW_REGIME
 
@@ -224,7 +224,7 @@ class SciPyStepper(Stepper):
         return solver
 
     def _take_solver_step(self, motion: Any, solver: OdeSolver) -> bool:
-        """Take one solver step, and return False if it exceeds the budget.
+        """Take one solver step, and return False if the step exceeds the evaluation budget.
 
         Trial steps may leave the domain of the equations, so floating-point warnings are
         suppressed. The solver rejects trial steps with invalid values, and the event loop checks
@@ -256,6 +256,6 @@ class SciPyStepper(Stepper):
         return np.asarray(known, dtype=float)
 
     def _copy_step_end_to_workspace(self, workspace: Any) -> None:
-        """Copy the end of the step to the workspace."""
+        """Copy the unknowns and their rates at the end of the step to the workspace."""
         workspace.y_end[: workspace.unknown_count] = self._solver.y
         workspace.rates_at_end[: workspace.unknown_count] = self._get_current_solver_rates()

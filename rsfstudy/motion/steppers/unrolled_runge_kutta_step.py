@@ -128,7 +128,7 @@ def _generate_weighted_sum_call(sum_name: str, unknown_index: int) -> str:
 
 
 def _generate_weighted_sum_argument_code(sum_name: str) -> str:
-    """Return the source code of the argument list of a weighted-sum function."""
+    """Return the source code that lists the arguments of a weighted-sum function."""
     return ", ".join(f"k{s}" for s in np.flatnonzero(_RUNGE_KUTTA_WEIGHTS_BY_SUM_NAME[sum_name]))
 
 

@@ -177,9 +177,9 @@ def build_slow_manifold_slip_rate_functions(
     def growth(state: FloatTuple, rates: FloatTuple, x: float, g: float, p: FloatTuple) -> float:
         """Compute the derivative of ln V along the motion.
 
-        The derivative includes the change of ``log_slip_rate_offset``. Without this contribution,
-        the peak slip rate would occur too early. The error would be a slip distance of
-        ``(K/a) w**2``, in units of D_c.
+        The derivative includes the rate of change of ``log_slip_rate_offset``. Without this
+        contribution, the peak slip rate would occur too early, by a slip distance of
+        ``(K/a) w**2`` in units of D_c.
         """
         spring_stress, psis = state[0], state[1:]
         slope = strength(spring_stress, psis, p)[1]

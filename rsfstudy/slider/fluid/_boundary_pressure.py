@@ -65,7 +65,7 @@ def add_boundary_pressure_to_rates(fluid_auxiliary_rates: NumericFunction) -> Nu
 def add_boundary_pressure_to_steady_states(
     fluid_auxiliary_steady_states: NumericFunction,
 ) -> NumericFunction:
-    """Return a steady-state function that includes the surrounding pressure.
+    """Return a steady-state function that includes the pressure of the surroundings.
 
     Parameters
     ----------

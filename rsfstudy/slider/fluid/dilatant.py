@@ -57,7 +57,7 @@ def compute_porosity_and_pressure_rates(
 def compute_rates_with_porosity_length(
     log_slip_rate: float, states: FloatTuple, slip_per_independent_variable: float, p: FloatTuple
 ) -> FloatTuple:
-    r"""Compute the rates if porosity has a separate slip distance.
+    r"""Compute the rates of porosity and pore pressure if porosity has its own slip distance.
 
     Unlike ``compute_porosity_and_pressure_rates``, the function uses the slip distance
     :math:`L_\varphi` for the porosity. It reads :math:`D_c/L_\varphi` from ``p[FLUID + 2]``.
@@ -78,7 +78,7 @@ def compute_rates_with_porosity_length(
 
 
 def choose_porosity_rate_function(porosity_length: float) -> NumericFunction:
-    """Return the function for the rates of porosity and pore pressure.
+    """Return the function that computes the rates of porosity and pore pressure.
 
     Parameters
     ----------

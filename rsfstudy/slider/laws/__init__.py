@@ -210,7 +210,7 @@ class LawBase(Part):
         raise TypeError(f"{type(self).__name__} does not define b_over_a")
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
-        """Return the parameters that precede the fields of the law in ``p``.
+        """Return the parameters that precede the fields of the law in the tuple ``p``.
 
         The base class returns an empty tuple.
 

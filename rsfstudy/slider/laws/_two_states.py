@@ -135,7 +135,7 @@ class TwoStateLaw(LawBase):
         return super().build_field_rejection_error(field_name, value)
 
     def check(self, scene: SceneView) -> None:
-        """Check the evolution effects and the critical stiffness.
+        """Check that a state affects friction and that the critical stiffness exists.
 
         See ``Part.check``. The critical stiffness is required only if the stiffness is given by
         ``stiffness_ratio``.

@@ -76,7 +76,7 @@ def compute_state_evolution_per_slip(log_slip_rate: float, state: float, p: Floa
 def compute_steady_states(
     log_slip_rate: float, stress_induced_state_shift: float, p: FloatTuple
 ) -> FloatTuple:
-    r"""Compute the state variable in steady sliding, including the shift.
+    r"""Compute the sum of the steady state variable and the stress-induced shift.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def compute_remaining_stress_change_rates(
 
     See ``Fluid`` for the arguments. The tuple ``states`` contains this unknown, :math:`P`, which is
     the change in normal stress that the ramp has not yet imposed. The function reads the rate of
-    imposed normal stress, in :math:`\sigma_* V_*/D_c`, from ``p[LOADING]``.
+    imposed normal stress, in units of :math:`\sigma_* V_*/D_c`, from ``p[LOADING]``.
 
     Notes
     -----
