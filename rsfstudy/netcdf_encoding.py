@@ -1,4 +1,4 @@
-"""Encoding of datasets for NetCDF files that follow the CF conventions."""
+"""Functions that choose the NetCDF encoding of datasets according to the CF conventions."""
 
 from __future__ import annotations
 

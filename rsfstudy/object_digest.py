@@ -1,4 +1,4 @@
-"""Digest of Python objects and of the code that the objects use.
+"""Functions and classes that compute a digest of Python objects and the code that they use.
 
 A digest identifies functions, classes and data by their content. The digest of a function is
 computed from its compiled code, so comments, docstrings and line numbers do not affect the digest.
@@ -38,7 +38,7 @@ _CONTENTS_GETTERS_BY_TYPE: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
 
 
 class ObjectDigest:
-    """SHA-256 digest of Python objects and of the code that the objects use.
+    """SHA-256 digest that covers Python objects and the code that the objects use.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Validation of paths before the file system is accessed."""
+"""Function that validates a path before the file system is accessed."""
 
 from __future__ import annotations
 

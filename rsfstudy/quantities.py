@@ -151,7 +151,7 @@ class Output(Quantity):
 
     @property
     def variable_names(self) -> tuple[str, ...]:
-        """Names of the output and of its error estimate, if any."""
+        """Name of the output, followed by the name of its error estimate if the output has one."""
         return (self.name, f"{self.name}_error") if self.error else (self.name,)
 
 

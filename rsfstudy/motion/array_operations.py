@@ -1,4 +1,4 @@
-"""Array operations of the event loop in plain Python.
+"""Array operations that the event loop calls in plain Python.
 
 In plain Python, the arrays are memory views, and the equations are functions that fill arrays. In
 compiled code, arrays are represented by pointers and functions by addresses, so

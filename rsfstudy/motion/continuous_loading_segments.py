@@ -1,4 +1,4 @@
-"""Chains of loading segments between stress jumps, and events at the start of a chain."""
+"""Functions that split the loading at stress jumps and find the events at each jump."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Support for the deprecated arguments ``accuracy`` and ``meter``.
+"""Functions that support calls with the deprecated arguments ``accuracy`` and ``meter``.
 
 Functions that had the arguments ``accuracy`` and ``meter`` now have the argument ``integrator``.
 Until version 1.0.0, calls with the deprecated arguments still work and emit a

@@ -1,4 +1,4 @@
-"""Creation of steppers and of the compiled engine from engine names."""
+"""Functions that create a stepper, or import the compiled engine, by the name of the engine."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def call_array_function_with_engine(
 
 
 class Engine:
-    """Names of the engines, and functions that find, check and compile engines."""
+    """Namespace that contains the engine names and the functions that find and check engines."""
 
     SCIPY, PYTHON, COMPILED = engines.ENGINE_NAMES
     #: Names of the engines of the package, without user-defined steppers.

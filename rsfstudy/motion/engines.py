@@ -130,7 +130,7 @@ def build_unknown_engine_error(engine: Any) -> InvalidValue:
 
 @dataclass
 class CompilationLog:
-    """Record of compilations in this process.
+    """Log that counts the compilations in this process and adds up the compilation times.
 
     Compiled programs that were loaded from the cache are not counted.
 

@@ -1,4 +1,4 @@
-"""Conversion of equations of motion to functions that fill arrays.
+"""Functions that convert equations of motion to functions that fill arrays.
 
 The event loop calls the equations through functions that fill arrays. The functions of
 ``slider.equations.EquationsOfMotion`` take and return tuples of floats.
@@ -20,7 +20,7 @@ from rsfstudy.slider import EquationsOfMotion, FloatTuple, NumericFunction
 
 
 class InPlaceFunctions(NamedTuple):
-    """Functions of a system of equations, ordered as in the function table.
+    """Functions that evaluate a system of equations, in the order of the function table.
 
     Each function has the arguments ``(y, rates, p, result)``, and fills the ``result`` array. The
     only exception is ``attempt_step``, whose arguments are ``(y, stages, p, step)``.

@@ -1,4 +1,4 @@
-"""Initial points of motions, at the start and after jumps in the loading.
+"""Functions that compute the point at which a motion starts or resumes after a loading jump.
 
 The event loop chooses the regime of an initial point. The module ``regime_switching`` contains the
 criteria for this choice.

@@ -1,4 +1,4 @@
-"""Events of a motion: kinds of events, and specifications of requested events.
+"""Classes and functions that describe the events of a motion and specify the events to report.
 
 The module ``integration_step_events`` detects and locates the events. The event table lists the
 events in chronological order. For each event, the table contains the slip and the point of the

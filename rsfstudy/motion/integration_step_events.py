@@ -1,4 +1,4 @@
-"""Detection of events within a step and at jumps.
+"""Functions that detect the events within an integration step and at jumps in the loading.
 
 ``append_events_in_step`` is called by ``motion_loop.integrate_one_regime`` after each step. The
 module ``integration_step_root_conditions`` locates the events.

@@ -1,4 +1,4 @@
-"""Truncation of steps at the end of a regime, segment or motion."""
+"""Functions that truncate a step at the end of a regime, segment or motion."""
 
 from __future__ import annotations
 

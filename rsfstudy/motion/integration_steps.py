@@ -1,4 +1,4 @@
-"""Integration, refinement and truncation of a single step.
+"""Functions that integrate, refine and truncate a single step.
 
 In each step, the event loop calls ``take_step`` first. The other functions evaluate the motion
 within the step, or change the end of the step.

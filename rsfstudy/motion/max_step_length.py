@@ -1,4 +1,4 @@
-"""Maximum step sizes of the integration."""
+"""Function that computes the maximum step size of the integration."""
 
 from __future__ import annotations
 

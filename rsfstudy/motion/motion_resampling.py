@@ -1,4 +1,4 @@
-"""Resampling of recorded motions at a given number of points."""
+"""Function that resamples a recorded motion at a given number of points."""
 
 from __future__ import annotations
 

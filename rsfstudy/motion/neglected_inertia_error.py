@@ -1,4 +1,4 @@
-"""Error estimate of the slow-manifold approximation along a recorded motion.
+"""Functions that estimate the error of the slow-manifold approximation in a recorded motion.
 
 A comparison of two runs with different tolerances does not reveal the error of the slow-manifold
 approximation, because both runs use the same approximation.

@@ -1,4 +1,4 @@
-"""Descriptions of overflows in user-defined functions.
+"""Functions that describe numerical overflows in user-defined functions.
 
 The integrators reject a trial step whose rates overflow. The rates may also overflow at the point
 where a step or a motion starts, so that no step is possible. In this case, the functions of this

@@ -131,7 +131,7 @@ class PythonBackend:
 
 @partial(add_former_member_names, allow_assignment=True)
 class PythonMotionState(SimpleNamespace):
-    """State of a motion as a Python object with the fields of ``MOTION_STATE_DTYPE``."""
+    """State of a motion, stored in a Python object with the fields of ``MOTION_STATE_DTYPE``."""
 
     @property
     def motion_state_array(self) -> list[PythonMotionState]:

@@ -1,4 +1,4 @@
-"""Recording of a motion as a table of samples.
+"""Classes and functions that record a motion as a table of samples.
 
 The event loop fills blocks of rows, which ``motion_driver`` appends to a ``MotionRecorder``.
 ``MotionRecorder.as_table`` converts the blocks to a table. ``resample_along_path`` reduces the

@@ -1,4 +1,4 @@
-"""Starts of regimes and of loading segments."""
+"""Functions that start a regime or a loading segment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Criteria for changes between regimes and for the termination of motions.
+"""Criteria that determine when a motion changes its regime and when it ends.
 
 If the scene has inertia, a motion alternates between two regimes: the slow manifold, and the
 inertial equations of motion. The slow manifold approximates the effect of inertia by a series in
@@ -41,7 +41,7 @@ CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_R
 
 
 class RegimeSwitchThresholds(NamedTuple):
-    r"""Thresholds for changes between the slow manifold and inertial equations.
+    r"""Thresholds at which a motion switches between the slow manifold and inertial equations.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Work budget, tolerance limits and early termination of motions."""
+"""Classes that limit the work of a measure and report stopped motions, and tolerance limits."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class MotionStopped(RsfStudyError):
 @add_former_member_names
 @dataclass
 class WorkMeter:
-    """Counter of the right-hand side evaluations of a measure, with a budget.
+    """Counter that limits the right-hand side evaluations of a measure to a budget.
 
     Parameters
     ----------

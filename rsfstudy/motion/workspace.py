@@ -1,4 +1,4 @@
-"""Workspace of a regime: arrays, functions and constants for its integration.
+"""Workspace that contains the arrays, functions and constants for integrating one regime.
 
 ``motion_loop.advance_motion`` creates a workspace for each regime, and steppers receive it as an
 argument. The arrays are written by the following functions. Functions without a module name belong
@@ -58,7 +58,7 @@ REPLACEMENT_OF_ZERO_TIME_DERIVATIVE = 1e-300
 
 @add_former_member_names
 class Workspace(NamedTuple):
-    """Arrays, functions and constants of one regime.
+    """Arrays, functions and constants that the event loop needs to integrate one regime.
 
     In compiled code, the arrays are represented by pointers, which only support indexing.
 

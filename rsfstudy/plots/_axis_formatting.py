@@ -1,4 +1,4 @@
-"""Scales, ticks and colours for the axes of a lattice.
+"""Functions that choose the scales, ticks and colours for the axes of a lattice.
 
 A lattice is the grid of all parameter combinations of a study, and the points of an axis are its
 parameter values. The functions in this module determine whether the points are numbers, whether the

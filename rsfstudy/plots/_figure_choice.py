@@ -1,4 +1,4 @@
-"""Choice of the figure that displays the results of a study."""
+"""Functions that choose the figure that displays the results of a study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure of frictional healing in a slide-hold-slide test."""
+"""Figure that shows frictional healing in a slide-hold-slide test."""
 
 from __future__ import annotations
 

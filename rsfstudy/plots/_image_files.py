@@ -1,4 +1,4 @@
-"""Figures for notebooks, and image files of figures."""
+"""Functions that render figures for notebooks and write figures to image files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure of a single motion or limit cycle.
+"""Figure that shows a single motion or limit cycle.
 
 The function ``plot_motion`` plots friction and slip rate against displacement or time, and draws
 the trajectory of the motion in the phase plane.

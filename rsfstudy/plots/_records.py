@@ -1,4 +1,4 @@
-"""Figure of a laboratory record with its steps and holds."""
+"""Figure that shows a laboratory record and marks its steps and holds."""
 
 from __future__ import annotations
 

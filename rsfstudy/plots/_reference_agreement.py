@@ -1,4 +1,4 @@
-"""Figure of the agreement between the results of another code and reference results."""
+"""Figure that shows how well the results of another code agree with reference results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Style sheet, legends and layout of figures.
+"""Functions that apply the style sheet, place the legends and compute the layout of figures.
 
 The context manager ``style_context`` applies the style sheet of rsfstudy. The other functions in
 this module compute the size of a figure, cycle through colours and markers, place legends outside

@@ -1,4 +1,4 @@
-"""Formatting of labels, symbols, units and numbers for figures."""
+"""Functions that format labels, symbols, units and numbers for figures."""
 
 from __future__ import annotations
 

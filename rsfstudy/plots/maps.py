@@ -1,9 +1,9 @@
 """Maps of a variable as a function of two numeric axes.
 
-The function ``build_map_panels`` builds one map for each point of the other axes of the
-study. A map shows the variable as colours with labelled contours. Lattice cells without a value are
-hatched according to their status. The module ``_figures`` chooses between maps, lines and scatter
-matrices.
+The function ``build_map_panels`` builds one map for each point of the other axes of the study. A
+map shows the variable as colours with labelled contours. Lattice cells without a value are hatched
+according to their status. The module ``_figure_choice`` chooses between maps, line plots and corner
+plots.
 """
 
 from __future__ import annotations

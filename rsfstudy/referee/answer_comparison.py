@@ -1,4 +1,4 @@
-"""Comparison of an answer with the known answer to a problem.
+"""Functions that compare an answer of another code with the known answer to a problem.
 
 The function ``compare_answers`` counts the correct digits. If an answer has too few correct digits,
 the function also tests whether another convention, such as other units, explains the difference
@@ -60,7 +60,7 @@ _REFERENCE_RTOLS, _EXPLANATION_RTOL = (1e-9, 1e-11), 1e-8
 
 @dataclass(frozen=True)
 class QuantityAgreement:
-    """Agreement of one quantity with the known answer.
+    """Result of the comparison of one quantity with the known answer.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class QuantityAgreement:
 
 @dataclass(frozen=True)
 class AnswerComparison:
-    """Agreement of all quantities of an answer with the known answer.
+    """Result of the comparison of all quantities in an answer with the known answer.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Comparison of the output files of other codes with known answers."""
+"""Functions that compare the output files of other codes with known answers."""
 
 from __future__ import annotations
 

@@ -231,7 +231,7 @@ class BenchmarkProblem:
 
     @cached_property
     def rig(self) -> Rig:
-        """Rig with the scales, stiffness and inertia of the problem."""
+        """Rig that has the scales, the stiffness and the inertia that the problem specifies."""
         return Rig(
             **{
                 _RIG_FIELD_BY_PARAMETER[n]: v
@@ -252,7 +252,7 @@ class BenchmarkProblem:
 
     @property
     def b_values(self) -> tuple[float, ...]:
-        """Evolution effects b, one value per state variable."""
+        """Evolution effect parameters b, with one value per state variable."""
         return tuple(
             self.si_parameters[name] for name in ("b", "b_2") if name in self.si_parameters
         )
@@ -267,7 +267,7 @@ class BenchmarkProblem:
 
     @cached_property
     def scene(self) -> Scene:
-        """Scene of the problem, without the initial state."""
+        """Scene that represents the problem, except for the initial state."""
         rig, si, a = (
             self.rig,
             self.si_parameters,

@@ -1,4 +1,4 @@
-"""Tables with the answers of other codes.
+"""Functions that read the answers of other codes from tables.
 
 The headings and units of a table may differ from the headings and units that the problem specifies.
 The function ``read_external_answer`` converts the columns to SI units.

@@ -1,4 +1,4 @@
-"""Tables and summaries of results, for the command line and the HTML report.
+"""Functions that present results as tables and summaries on the command line and in reports.
 
 Most functions take a dataset and return tables whose cells are strings. There are tables of
 reductions, claims, failed cells and fits. The package never computes results and never prints.

@@ -1,4 +1,4 @@
-"""Tables of study cells, and counts of cells by status."""
+"""Functions that list study cells in tables and count the cells with each status."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of claims and their verdicts, and counts of claims by verdict."""
+"""Functions that list the verdicts on claims in a table and count the claims per verdict."""
 
 from __future__ import annotations
 

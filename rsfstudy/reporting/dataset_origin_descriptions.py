@@ -1,4 +1,4 @@
-"""Descriptions of the scene, the rig and the provenance of results."""
+"""Functions that describe the scene, the rig and the provenance of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Summaries of datasets for commands, reports and notebooks.
+"""Functions that summarise datasets for commands, reports and notebooks.
 
 The main function is ``build_summary_tables_and_sentences``. A summary consists of tables, mappings
 and sentences.

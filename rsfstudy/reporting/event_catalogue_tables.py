@@ -1,4 +1,4 @@
-"""Tables of the stress drops in laboratory records."""
+"""Functions that list the stress drops in laboratory records."""
 
 from __future__ import annotations
 

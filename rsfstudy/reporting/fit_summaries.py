@@ -1,4 +1,4 @@
-"""Tables of fits, and remarks on fits, for commands and reports."""
+"""Functions that build tables of fits and add remarks on each fit, for commands and reports."""
 
 from __future__ import annotations
 

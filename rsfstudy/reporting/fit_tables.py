@@ -1,4 +1,4 @@
-"""Results of fits, as a table for users and as dictionaries for JSON output."""
+"""Functions that convert the results of fits to a table, or to dictionaries for JSON output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of frictional healing, printed by the commands."""
+"""Functions that build the tables of frictional healing that the commands print."""
 
 from __future__ import annotations
 

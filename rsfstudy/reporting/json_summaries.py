@@ -1,4 +1,4 @@
-"""Summaries of datasets for the JSON output of commands.
+"""Functions that summarise datasets for the JSON output of commands.
 
 The functions return dictionaries whose values are numbers and strings. The numbers are the same as
 in the printed tables, but they are not rounded.

@@ -1,4 +1,4 @@
-"""Tables of the primary output of a study, and short summaries of a study."""
+"""Functions that tabulate the primary output of a study and summarise the study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of reductions, and reasons why reductions have no results."""
+"""Functions that tabulate reductions and explain why some reductions have no results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plain-text tables of datasets, for commands and reports."""
+"""Functions that convert datasets to plain-text tables for commands and reports."""
 
 from __future__ import annotations
 

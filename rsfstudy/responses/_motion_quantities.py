@@ -1,4 +1,4 @@
-"""Quantities at points and events of a motion, used by the response measures."""
+"""Functions that compute the quantities that response measures need at points of a motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recorded motions, and error estimates for results read at a single instant."""
+"""Functions that record a motion and estimate the errors of results read at one instant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frictional healing and relaxation caused by a hold of the load point."""
+"""Measure that computes frictional healing and relaxation due to a hold of the load point."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _HEALING_OUTPUTS = (
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Healing(RecordingMeasure):
-    r"""Relaxation and healing of friction due to the first hold in a loading.
+    r"""Relaxation and healing of friction that the first hold in a loading causes.
 
     The definitions are the same as in laboratory studies. Relaxation is the change of friction
     during the hold, and is usually negative. Healing is the peak friction after reloading minus the

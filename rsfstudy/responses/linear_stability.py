@@ -60,7 +60,7 @@ class LinearStability(Measure):
     r"""Critical stiffness and growth rate at the load point velocity.
 
     The critical stiffness of steady sliding is computed by three methods, whose results are
-    compared. The first result follows from the friction relation. The second result is the
+    compared. The first result is computed from the friction relation. The second result is the
     stiffness at which small perturbations neither grow nor decay according to the equations of
     motion. The third result is the quasi-static closed form, corrected for inertia and radiation
     damping.
@@ -144,7 +144,7 @@ class LinearStability(Measure):
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Scene fields whose values are ignored: ``stiffness_ratio``, or no field.
+        """Names of ignored scene fields: ``stiffness_ratio``, unless the growth rate is requested.
 
         If the growth rate is requested, the value of the stiffness is used and the tuple is empty.
         """

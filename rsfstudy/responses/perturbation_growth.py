@@ -1,7 +1,8 @@
-"""Growth of small perturbations of steady sliding, from the equations of motion.
+"""Functions that compute how fast perturbations grow according to the equations of motion.
 
 The equations of motion are differentiated numerically. The module does not use the friction
-relation, so the growth rates can be compared with the growth rates from the friction relation.
+relation, so the growth rates are an independent check on the growth rates that are computed from
+the friction relation.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ _RIGID_RESPONSE_OUTPUTS = (
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class RigidResponse(Measure):
-    r"""Stress as a function of slip after a slip rate step of a rigid slider.
+    r"""Stress of a rigid slider as a function of the slip after a step in slip rate.
 
     The slip rate of the slider changes suddenly from V_* to V, and the ratio V/V_* is the field
     ``load_velocity_ratio`` of the scene. At the step, the direct effect changes the stress by the

@@ -1,4 +1,4 @@
-"""Oscillations of slip rate after a step, and the path of the motion."""
+"""Measure that records the motion after a step and finds the peaks of the slip rate."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _STEP_RESPONSE_OUTPUTS = (
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class StepResponse(RecordingMeasure):
-    """Peaks of slip rate after a step, and the path of the motion.
+    """Peaks of the slip rate after a step, and the recorded path of the motion.
 
     The motion is integrated until it has the requested number of peaks, or until it settles. A
     motion is considered settled if its distance from steady sliding (in ln V and the states) is

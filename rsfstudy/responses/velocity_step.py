@@ -121,8 +121,8 @@ class VelocityStep(RecordingMeasure):
     record. The slip distance is measured from the extremum of friction to the point at which the
     difference between friction and its final value has decreased to 1/e of the difference at the
     extremum. The slip distance is reported as load point displacement and as slip, which excludes
-    the elongation of the spring. The results are not corrected for the stiffness of the machine,
-    and therefore show the effect of a soft machine.
+    the elongation of the spring. The results are not corrected for the stiffness of the machine, so
+    they differ from the true parameters if the machine is soft.
 
     ``settled`` is 1 if friction varies by less than a hundredth of the direct effect over the last
     tenth of the record, and if small perturbations of steady sliding do not grow. Otherwise the

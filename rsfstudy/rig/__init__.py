@@ -1,4 +1,4 @@
-"""Laboratory rigs, with scenes, axes and files in physical units.
+"""Laboratory rigs that create scenes and axes from quantities in physical units.
 
 A ``Rig`` has a stiffness, a normal stress, a slip distance and a reference velocity in physical
 units. The package ``rsfstudy.rig`` converts rig quantities to the dimensionless fields of scenes

@@ -1,4 +1,4 @@
-"""Axes with physical units for studies of a rig.
+"""Functions that create axes with physical units for studies of a rig.
 
 `make_axis_with_units` is the main function.
 """

@@ -1,4 +1,4 @@
-"""Options and column selection shared by all functions that read records.
+"""Options and column selection that all functions for reading records share.
 
 The functions `read_record`, `events` and `history` use different columns of a file. `read_columns`
 reads the columns that one of these functions can use, from a source in any format.
@@ -89,7 +89,7 @@ class RecordReadingOptions(RowSelection):
 
 
 class ColumnsReadFromSource(NamedTuple):
-    """Selected columns of a source, and the table that contains them.
+    """Columns that were selected from a source, and the table that contains the columns.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Conversion of datasets between dimensionless and physical units.
+"""Functions that convert datasets from dimensionless to physical units.
 
 The attribute ``scale`` of a dimensionless variable contains the unit in which the variable is
 expressed, for example ``D_c/V_*``. The main function `convert_dataset_units` multiplies variables

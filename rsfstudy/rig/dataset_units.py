@@ -1,4 +1,4 @@
-"""Conversion of a dataset to physical units."""
+"""Class that converts a dataset to physical units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rsfstudy.rig.dataset_unit_scales import UnitScale
 
 
 class DatasetUnits:
-    """Unit scales and unit conversions of a dataset.
+    """Converter that finds the unit scales of a dataset and converts it to physical units.
 
     Parameters
     ----------

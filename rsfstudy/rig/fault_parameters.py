@@ -1,4 +1,4 @@
-"""Conversion of fault parameters to scene fields."""
+"""Function that converts fault parameters to scene fields."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loading histories from data in any units.
+"""Functions that create loading histories and segments from data in any units.
 
 `history` creates a sampled loading history from arrays, datasets or CSV files. `read_protocol`
 reads a list of loading segments from a CSV file.

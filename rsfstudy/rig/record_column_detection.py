@@ -1,4 +1,4 @@
-"""Selection of record columns by common headings.
+"""Functions that find the columns of a record by common headings.
 
 The functions ``read_record``, ``events`` and ``history`` use different columns of the same files.
 """

@@ -1,4 +1,4 @@
-"""Reading of laboratory records from files and arrays.
+"""Functions that read laboratory records from files and arrays.
 
 `read_record` is the main function.
 """

@@ -1,4 +1,4 @@
-"""Laboratory rig for converting scenes and results between units.
+"""Laboratory rig that converts scenes and results between physical and dimensionless units.
 
 `Rig.scene` creates dimensionless scenes from quantities in physical units. `Rig.in_units` converts
 dimensionless results to physical units.

@@ -1,4 +1,4 @@
-"""Rig quantities, and scene fields that have dimensionless units.
+"""Functions that check and convert rig quantities and derive scene fields from the quantities.
 
 The function ``convert_rig_value_to_si`` converts quantities of a rig. This function calls
 ``units.convert_to_si``, and also converts stiffness in units of friction divided by displacement.

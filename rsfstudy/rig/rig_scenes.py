@@ -1,4 +1,4 @@
-"""Scenes for the lattice cells of a study of a rig.
+"""Functions and classes that build the scenes for all lattice cells of a rig study.
 
 `RigAxesToScenesConverter` converts axes with physical units to dimensionless scene fields.
 """
@@ -37,7 +37,7 @@ from rsfstudy.slider import Scene
 
 @dataclass(frozen=True)
 class RigAxesToScenesConverter:
-    """Converter from axes with physical units to dimensionless scene fields.
+    """Converter that translates axes with physical units to dimensionless scene fields.
 
     If an axis varies a scale such as the slip distance, fields of the base scene keep their SI
     values. The dimensionless values of these fields vary along the axis. In contrast, fields that

@@ -6,7 +6,7 @@ from rsfstudy.rig import axes_with_units, rig_quantities, rig_scenes
 
 
 class RigAxes:
-    """Functions that create, convert and replace study axes of a rig."""
+    """Namespace that contains the functions for creating and converting the study axes of a rig."""
 
     #: Names of the ratios to which the scene converts dimensional fields.
     RATIO_FIELD_BY_DIMENSIONAL_NAME = rig_quantities.RATIO_FIELD_BY_DIMENSIONAL_NAME

@@ -1,4 +1,4 @@
-"""Selection, filtering and thinning of the rows of a record while it is read."""
+"""Functions and classes that select, filter and thin the rows of a record during reading."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _DEFAULT_UNITS_BY_COLUMN = {"time": "s", "displacement": "um", "slip": "um"}
 
 @dataclass(frozen=True)
 class RowSelection:
-    """Selection, filter and thinning of the rows of a record.
+    """Options that define how the rows of a record are selected, filtered and thinned.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Columns of tables, and selections of columns.
+"""Classes and functions that represent table columns and parse column selections.
 
 A column selection contains the heading and the units of the column, a scale and an offset.
 """

@@ -1,4 +1,4 @@
-"""Conversion of quantities with units to SI units.
+"""Functions that convert quantities with units to SI units.
 
 A quantity is a number followed by a unit, for example ``5 MPa``. This module converts common units
 without pint, and uses pint for other units. Only names of units are passed to pint, because pint

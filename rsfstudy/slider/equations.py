@@ -118,7 +118,7 @@ class EquationsOfMotion(NamedTuple):
 
 @cached_per_scene
 def build_equations_between_ruptures(scene: SceneView, *, with_time: bool) -> EquationsOfMotion:
-    """Return the equations of a scene between ruptures.
+    """Return the equations that describe the motion of a scene between ruptures.
 
     Between ruptures, inertia has a small effect or no effect on the motion. The unknowns are the
     spring stress f and the states.

@@ -1,4 +1,4 @@
-"""Finite-difference derivatives of the state evolution in steady sliding."""
+"""Functions that differentiate the state evolution numerically in steady sliding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hints for unknown field names and law names of a scene.
+"""Functions that suggest corrections for unknown field names and law names of a scene.
 
 The module maps common synonyms to the names that rsfstudy uses.
 """

@@ -1,4 +1,4 @@
-r"""Velocity ratios, and the path length used as the independent variable.
+r"""Functions that compute velocity ratios and derivatives with respect to path length.
 
 Motions are integrated with the path length :math:`\lambda` as the independent variable. The path
 length combines a variable :math:`\delta` with :math:`x = \ln(V/V_*)`. Between ruptures,
@@ -17,8 +17,8 @@ were the independent variable, each integration step could cover only a fraction
 remaining interval, so many steps would be necessary. In contrast, the path length of such an
 interval is only a few units. The change in :math:`\ln V` is divided by 6 because this reduces the
 number of integration steps near the largest slip rate. With this divisor, the direction of the path
-changes more gradually, over a change of 6 in :math:`\ln V` instead of 1. Any divisor between 4 and
-12 leads to a similar number of steps.
+changes more gradually, namely while :math:`\ln V` changes by 6 instead of by 1. Any divisor between
+4 and 12 leads to a similar number of steps.
 """
 
 from __future__ import annotations

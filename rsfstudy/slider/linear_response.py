@@ -1,4 +1,4 @@
-r"""Linear response of friction and of the force balance around steady sliding.
+r"""Functions that linearise the friction and the force balance around steady sliding.
 
 Consider a small perturbation of slip, :math:`du`, that grows as :math:`\exp(p s)` with slip
 :math:`s` in units of :math:`D_c`. The perturbation of the frictional stress is

@@ -1,4 +1,4 @@
-r"""Functions for the stress, slip rate and states at a point of a motion.
+r"""Functions that compute the stress, the slip rate and the states at a point of a motion.
 
 The module builds functions that compute a ``MotionPoint`` from the arguments ``(state, rates, p)``.
 The argument ``state`` contains the unknowns of the equations of motion, ``rates`` contains the

@@ -1,4 +1,4 @@
-r"""Sample paths of noise that depend only on a seed and on the time.
+r"""Functions that compute noise paths, which depend only on the seed and the time.
 
 A path is defined at the times :math:`H j/2^l`, in which :math:`H` is the base interval, and the
 index :math:`j` and the level :math:`l` are integers. The base interval is the product of a power of
@@ -34,7 +34,7 @@ _RANDOM_WORDS_PER_COUNTER_VALUE = 4
 
 
 class UnitNoisePath(NamedTuple):
-    r"""Path of unit noise, as a function of time in :math:`D_c/V_*`.
+    r"""Noise path of unit amplitude, as a function of time in units of :math:`D_c/V_*`.
 
     Without a correlation time, the path is a Wiener process with the variance :math:`t`. With the
     correlation time :math:`t_c`, it is the Ornstein-Uhlenbeck process
@@ -116,14 +116,14 @@ class UnitNoisePath(NamedTuple):
         return np.array(values[:stop_sample_index])
 
     def _compute_decay_and_innovation_deviation(self, time_step: float) -> tuple[float, float]:
-        """Return the decay factor of one time step, and the noise standard deviation."""
+        """Return the decay factor for one time step, and the deviation of the added noise."""
         if self.correlation_time is None:
             return 1.0, math.sqrt(time_step)
         decay = 2.0 * time_step / self.correlation_time
         return math.exp(-0.5 * decay), math.sqrt(-0.5 * self.correlation_time * math.expm1(-decay))
 
     def _compute_bridge_weight_and_deviation(self, neighbour_spacing: float) -> tuple[float, float]:
-        r"""Return the weight of each neighbour, and the midpoint standard deviation.
+        r"""Return the weight of each neighbour, and the standard deviation at the midpoint.
 
         With the correlation :math:`\rho` over half the spacing, the weight is
         :math:`\rho/(1 + \rho^2)`, and the variance of the Ornstein-Uhlenbeck process is reduced by
@@ -139,7 +139,7 @@ class UnitNoisePath(NamedTuple):
     def _draw_normal_random_numbers(
         self, bisection_level: int, first_index: int, count: int
     ) -> np.ndarray:
-        """Return the normally distributed random numbers of a level."""
+        """Return normally distributed random numbers for the given bisection level."""
         skipped = first_index % _RANDOM_WORDS_PER_COUNTER_VALUE
         generator = np.random.Philox(
             key=np.array([self.seed, self.random_stream_number], dtype=np.uint64),

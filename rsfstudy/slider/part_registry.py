@@ -1,4 +1,4 @@
-"""Registry of the slots, parts and fields of scenes.
+"""Registry that lists the slots of scenes, the available parts and their fields.
 
 The registry lists the parts that can fill each slot, and the fields that the parts add to a scene.
 A user-defined part is a class that is derived from the base class of a slot. A user-defined part is
@@ -206,7 +206,7 @@ class _UnsetDefault:
 def add_scene_fields_to_signature(
     *extra_field_names: str,
 ) -> Callable[[DecoratedFunction], DecoratedFunction]:
-    """Return a decorator that adds the fields of scenes to a signature.
+    """Return a decorator that adds the fields of scenes to the signature of a function.
 
     The signature is used for code completion in editors. The decorated function takes the fields as
     ``**kwargs``.

@@ -1,4 +1,4 @@
-"""Operations on polynomials for the stability analysis of steady sliding.
+"""Functions that operate on polynomials, used to analyse the stability of steady sliding.
 
 The coefficients of all polynomials are in ascending order of the powers.
 """

@@ -1,4 +1,4 @@
-"""Check that a scene provides the quantities that its parts need.
+"""Functions that check if a scene provides the quantities that its parts need.
 
 The attribute ``received_quantity_names`` of a part lists the quantities that are passed to its
 functions. If effective normal stress is constant, shear stress can be computed from the friction
@@ -122,7 +122,7 @@ def find_quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str
 
 
 class _CauseOfUnknownQuantity(NamedTuple):
-    """Reason why a quantity is unavailable in a scene, with a remedy."""
+    """Reason why a quantity is unavailable in a scene, and how to make it available."""
 
     unknown_quantity_name: str
     cause_text: str
@@ -150,7 +150,7 @@ def _find_causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknown
 def _find_causes_of_unknown_friction(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
     """Return the reasons why a law cannot compute the friction coefficient.
 
-    The friction coefficient of forward slip is not valid if slip reverses. If friction depends on
+    The friction coefficient for forward slip is not valid if slip reverses. If friction depends on
     temperature, the state that a law receives includes part of the temperature effect.
     """
     causes, temperature = [], scene.parts.temperature

@@ -1,4 +1,4 @@
-"""Loading histories from sampled records.
+"""Loading histories that interpolate sampled records.
 
 The samples contain the load point motion and normal stress as functions of time. Between samples,
 the load point velocity is constant and normal stress changes at a constant rate, so the record is
@@ -35,7 +35,7 @@ _UNKNOWNS_OF_RECORDED_NORMAL_STRESS = (
 
 
 class LazySegmentSequence(Sequence[Segment]):
-    """Sequence of segments that are created on access.
+    """Sequence of segments that creates each segment when the segment is accessed.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ class SampledHistory(UserLoading):
         return (float(self.sample_table[0, STRESS_FALL_COLUMN]),) if self.of_stress else ()
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
-        """Return the rate of normal stress after the first sample.
+        """Return the rate of change of normal stress after the first sample.
 
         See ``Part.parameter_values``.
         """

@@ -319,7 +319,7 @@ class Scene(SceneFunctions, SceneQuantities):
 
     @property
     def steadily_loaded_scene(self) -> Scene:
-        """Scene with a steadily moving load point, for stability analyses.
+        """Scene used in stability analyses, in which the load point moves steadily.
 
         If the loading has unknowns or noise, the load point of the returned scene moves at the
         velocity of the last segment, without noise. Otherwise the property returns the scene

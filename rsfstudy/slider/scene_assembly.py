@@ -1,4 +1,4 @@
-"""Construction of the parts of a scene from its fields.
+"""Functions that build the parts of a scene from the values of its fields.
 
 The function ``build_scene_parts`` creates the parts, and ``build_field_lookup`` assigns each field
 to its part.
@@ -42,7 +42,7 @@ from rsfstudy.slider.user_loadings import UserLoading
 
 
 class SceneParts(NamedTuple):
-    """Parts of a scene, one per slot, and the slider parameters.
+    """Slider parameters and parts of a scene, with one part per slot.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def _select_part_for_slot(slot: PartSlot, field_values: Mapping[str, Any]) -> Us
 
 
 class FieldLookup(NamedTuple):
-    """Assignment of fields to the parts of a scene.
+    """Table that assigns each field to a part of the scene.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Caches for values that are computed once per scene."""
+"""Decorators that cache values in a scene, so that each value is computed only once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compilation of the event loop and the equations with Numba.
+"""Functions that compile the event loop and the equations of motion with Numba.
 
 The module ``numba_backend`` is the entry point. This module compiles the event loop once, and
 compiles the equations once for each combination of scene parts (friction law, loading, fluid and so

@@ -1,8 +1,8 @@
 """Functions that replace Python functions of the event loop in compiled code.
 
 The compiled loop uses pointers instead of arrays, and calls the equations through their addresses.
-The loop is therefore compiled only once for all systems of equations. Pointers are also faster,
-because Numba passes each array as ten machine words and counts the references to the array.
+The loop is therefore compiled only once for all systems of equations. Pointers are also faster than
+arrays, because Numba passes each array as ten machine words and counts the references to the array.
 """
 
 from __future__ import annotations

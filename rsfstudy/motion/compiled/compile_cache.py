@@ -1,4 +1,4 @@
-"""Compilation of functions with Numba, and a cache of the results on disk.
+"""Functions that compile Python functions with Numba and cache the compiled code on disk.
 
 ``compile_or_load_function`` and ``compile_cfuncs_and_get_addresses`` are the main functions. These
 two functions copy a Python function together with all functions that it calls, replace the
@@ -167,7 +167,7 @@ def compile_cfuncs_and_get_addresses(functions: Sequence[Callable[..., Any]]) ->
 
 
 class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
-    """Numba cache of a function, with a content digest in the names of the cache files.
+    """Numba cache whose keys do not depend on the closure values of a function.
 
     By default, Numba includes the closure values of a function in the cache key. Closure values
     include compiled functions, which differ between processes. With the default cache key, Numba

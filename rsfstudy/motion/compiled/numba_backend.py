@@ -1,4 +1,4 @@
-"""Backend that runs the event loop compiled by Numba.
+"""Backend that compiles the event loop with Numba and runs the compiled loop.
 
 The loop is compiled once for all motions, and the equations are compiled once for each combination
 of parts. ``compile_equations_of_scene`` compiles all functions of a scene in advance.
@@ -154,7 +154,7 @@ class NumbaBackend:
 
 
 class NumbaMotionState:
-    """State of a motion as a record array.
+    """State of a motion, stored in a NumPy structured array.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Source code of a Runge-Kutta step, unrolled for a given number of unknowns.
+"""Functions that generate a Runge-Kutta step without loops for a given number of unknowns.
 
 The Butcher tableau is the same as in SciPy's DOP853 (Hairer, Norsett and Wanner 1993). For a simple
 scene, loops over stages and unknowns would take as much time as the evaluation of the equations. If

@@ -1,4 +1,4 @@
-"""Readers of tables in files and in memory.
+"""Readers that load tables from files or from objects in memory.
 
 Each module of this package reads one group of file formats. A reader consists of two functions: the
 first function checks if a source has the format of the reader, based on its first bytes or its

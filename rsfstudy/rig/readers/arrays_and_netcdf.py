@@ -1,4 +1,4 @@
-"""Readers of arrays in memory, and of NetCDF files."""
+"""Readers that load tables from arrays in memory or from NetCDF files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numeric arrays in MATLAB files of versions 5 to 7.
+"""Functions that read numeric arrays from MATLAB files of versions 5 to 7.
 
 The functions of this module check all lengths in the file. They replace ``scipy.io.loadmat``, which
 can crash the Python interpreter if a file is damaged.

@@ -1,4 +1,4 @@
-"""Errors of readers whose libraries are not installed."""
+"""Error that readers raise if a required library is not installed."""
 
 from __future__ import annotations
 

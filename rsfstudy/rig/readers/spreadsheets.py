@@ -1,4 +1,4 @@
-"""Reader of Excel and OpenDocument workbooks."""
+"""Reader that loads tables from Excel and OpenDocument workbooks."""
 
 from __future__ import annotations
 

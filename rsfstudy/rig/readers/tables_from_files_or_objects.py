@@ -1,4 +1,4 @@
-"""Sources of data, and the tables that readers return.
+"""Classes that represent the sources of data and the tables that readers return.
 
 A ``TableSource`` is a file or an object that contains data. A reader converts a source to a
 ``LazyTable``.

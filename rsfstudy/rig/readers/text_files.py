@@ -268,7 +268,7 @@ def _check_row_lengths(rows: _TextFileRows, layout: TextLayout, file_name: str) 
 
 
 class _FieldToNumberConverter(NamedTuple):
-    """Converter of the fields of a column to numbers.
+    """Converter that parses the fields of a column as numbers.
 
     Parameters
     ----------

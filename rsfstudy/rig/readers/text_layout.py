@@ -1,4 +1,4 @@
-"""Detection of the delimiter, the header and the first row of a text file.
+"""Functions that detect the delimiter, the header and the first row of a text file.
 
 The detection compares the fields of the first lines. A line that contains mostly numbers is a row
 of the table. The header is the last line of text that precedes the first row and has the same

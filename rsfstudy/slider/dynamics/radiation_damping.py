@@ -1,4 +1,4 @@
-"""Radiation damping by seismic waves (quasi-dynamic motion).
+"""Quasi-dynamic motion, in which seismic waves carry energy away (radiation damping).
 
 The radiated waves reduce the stress on the fault by an amount proportional to the slip rate.
 """

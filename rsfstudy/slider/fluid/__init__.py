@@ -40,8 +40,8 @@ class Fluid(Part):
 
     The argument ``log_slip_rate`` is :math:`\ln(V/V_*)`, ``states`` is the tuple of the unknowns,
     and ``p`` is the tuple of parameters, in which the parameters of the fluid start at
-    ``p[FLUID]``. When slip stops, a change per unit slip becomes infinite, but the product of the
-    change and the argument ``fraction`` remains finite.
+    ``p[FLUID]``. When slip stops, a rate of change per unit slip becomes infinite, but the product
+    of this rate and the argument ``fraction`` remains finite.
 
     The distance between the unknowns and their values in steady sliding determines whether a motion
     has settled and whether a cycle repeats. The attribute ``excluded_from_distance`` lists the
@@ -64,7 +64,7 @@ class Fluid(Part):
 
     @property
     def pressurisation_factor(self) -> float:
-        """Increase in undrained pore pressure, in sigma_*, for a temperature rise of T_*."""
+        """Increase in pore pressure, in sigma_*, when an undrained fault heats up by T_*."""
         return 0.0
 
     def compute_pore_pressure_upper_bound(self, log_slip_rate: float, states: FloatTuple) -> float:

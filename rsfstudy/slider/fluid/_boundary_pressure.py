@@ -1,4 +1,4 @@
-"""Combination of a pore fluid and a loading that imposes pressure."""
+"""Functions and a class that combine a pore fluid with a loading that imposes pressure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dilatancy or compaction with drainage (Segall and Rice 1995).
+"""Pore fluid that flows into or out of a dilating or compacting fault (Segall and Rice 1995).
 
 If the dilatancy is positive, pores open when the slip rate increases. The pore pressure then falls
 until fluid flows in from the surroundings. If the dilatancy is negative, pores close when the slip
@@ -147,7 +147,7 @@ def compute_steady_porosity_and_pressure(log_slip_rate: float, p: FloatTuple) ->
 
 @dataclass(frozen=True, kw_only=True)
 class DilatantFluid(Fluid):
-    r"""Dilatant pore fluid with drainage to the surroundings.
+    r"""Pore fluid of a dilatant fault that exchanges fluid with the surroundings.
 
     The pores open when the slip rate increases, which decreases the pore pressure. If the dilatancy
     is negative, the pores close when the slip rate increases, which increases the pore pressure.

@@ -11,7 +11,7 @@ from rsfstudy.slider.fluid import Fluid
 
 @dataclass(frozen=True, kw_only=True)
 class DrainedFluid(Fluid):
-    r"""Constant pore pressure of a drained fault.
+    r"""Pore fluid of a drained fault, in which the pore pressure is constant.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Thermal pressurisation with drainage and optional dilatancy (Rice 2006).
+"""Pore fluid that is pressurised by frictional heat in a fault that can dilate (Rice 2006).
 
 When the fault heats up, the pore fluid expands more than the pore space. The pore pressure
 therefore rises, and fluid flows out to the surroundings.
@@ -77,7 +77,7 @@ def return_zero_steady_pore_pressure(log_slip_rate: float, p: FloatTuple) -> Flo
 
 @dataclass(frozen=True, kw_only=True)
 class ThermalFluid(Fluid):
-    r"""Pore fluid with thermal pressurisation and drainage.
+    r"""Pore fluid that is pressurised by frictional heat and drains to the surroundings.
 
     The fluid expands when the temperature of the fault rises. The field ``temperature`` of the
     scene must be ``"shear_heating"``.
@@ -164,7 +164,7 @@ class ThermalFluid(Fluid):
 
     @property
     def pressurisation_factor(self) -> float:
-        """Increase in undrained pore pressure, in sigma_*, for a temperature rise of T_*."""
+        """Increase in pore pressure, in sigma_*, when an undrained fault heats up by T_*."""
         return self.pressurisation
 
     @property

@@ -228,7 +228,7 @@ class LawBase(Part):
 
     @property
     def steady_state_change_per_log_rate_over_a(self) -> float:
-        """Magnitude of the steady-state change per unit change of ln V, divided by a.
+        """Magnitude of the change in the steady state per unit change in ln V, divided by a.
 
         The value is always positive.
         """

@@ -1,4 +1,4 @@
-"""Base class and steady states of the laws with two state variables."""
+"""Base class and steady-state function of the laws that have two state variables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The slowness law with a cut-off of the evolution effect.
+"""The slowness law, modified so that the evolution effect vanishes at high slip rates.
 
 At slip rates far above the cut-off velocity, the friction coefficient no longer depends on the
 state variable.

@@ -1,4 +1,4 @@
-"""Loading histories of the load point.
+"""Loading histories, which prescribe the load point motion and the imposed normal stress.
 
 Each module of this package defines one loading history. The function ``discover_parts`` finds the
 modules automatically. A loading history is a sequence of segments. Before the first segment, the
@@ -319,7 +319,7 @@ def declare_load_velocity_field() -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadingWithFinalVelocityBase(Loading):
-    """Base class of the loadings with a field for the load point velocity.
+    """Base class of the loadings that have a field for the load point velocity.
 
     The load point velocity applies to the whole loading or to its last segment. The default is the
     reference velocity :math:`V_*`.

@@ -64,7 +64,7 @@ def return_zero_steady_oscillation(log_slip_rate: float, p: FloatTuple) -> Float
 
 @dataclass(frozen=True, kw_only=True)
 class OscillationBase(LoadingWithFinalVelocityBase):
-    r"""Base class of the oscillations, with two harmonic unknowns.
+    r"""Base class of the oscillations, which add two harmonic unknowns to the equations.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class OscillationBase(LoadingWithFinalVelocityBase):
 
     @property
     def oscillation_duration(self) -> float:
-        """Duration of the oscillation in :math:`D_c/V_*`."""
+        """Duration of the oscillation, in units of :math:`D_c/V_*`."""
         cycles = self.oscillation_cycles
         return math.inf if cycles is None else cycles * self.oscillation_period
 

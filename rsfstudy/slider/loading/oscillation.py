@@ -17,7 +17,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class NormalStressOscillation(_oscillation_base.OscillationBase):
-    r"""Oscillation of imposed normal stress at a steady load point velocity.
+    r"""Oscillation of imposed normal stress while the load point velocity is constant.
 
     If the driving stress is inclined to the fault, the oscillation changes the stress
     :math:`\sigma_3`. The other fields are described in ``OscillationBase``.

@@ -53,7 +53,7 @@ def return_zero_remaining_stress_change(log_slip_rate: float, p: FloatTuple) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class NormalStressRamp(LoadingWithFinalVelocityBase):
-    r"""Ramp of imposed normal stress at a steady load point velocity.
+    r"""Ramp of imposed normal stress while the load point velocity is constant.
 
     The slider slides steadily until the ramp starts. If the driving stress is inclined to the
     fault, the ramp changes the stress :math:`\sigma_3`.

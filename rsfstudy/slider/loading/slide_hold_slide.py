@@ -14,7 +14,7 @@ from rsfstudy.slider.parts import NON_NEGATIVE, number
 
 @dataclass(frozen=True, kw_only=True)
 class SlideHoldSlide(LoadingWithFinalVelocityBase):
-    r"""Hold of the load point, followed by reloading.
+    r"""Loading in which the load point stops for a given time and then moves again.
 
     Parameters
     ----------
@@ -52,5 +52,5 @@ class SlideHoldSlide(LoadingWithFinalVelocityBase):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """Segments of the hold and of the reloading."""
+        """Two segments: the hold, and the reloading."""
         return Segment(0.0, duration=self.hold_time), Segment(self.load_velocity)

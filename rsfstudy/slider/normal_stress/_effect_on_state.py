@@ -19,7 +19,7 @@ def compute_linker_dieterich_state_decrease(
     normal_stress_derivative: float,
     p: FloatTuple,
 ) -> tuple[float, float]:
-    r"""Compute the decrease in the state variable due to normal stress.
+    r"""Compute how much a change in normal stress decreases the state variable.
 
     See ``NormalStress.state_effect`` for the arguments. The function reads :math:`\alpha` from
     ``p[NORMAL_STRESS]``.
@@ -47,7 +47,7 @@ def compute_linker_dieterich_state_decrease(
 
 @dataclass(frozen=True, kw_only=True)
 class NormalStressWithStateEffect(NormalStress):
-    r"""Base class of the normal stress conditions with variable normal stress.
+    r"""Base class of the normal stress conditions in which normal stress can change.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def compute_normal_stress_minus_reference(
 
 @dataclass(frozen=True, kw_only=True)
 class ImposedNormalStress(NormalStressWithStateEffect):
-    r"""Imposed normal stress with an effect on the state variable.
+    r"""Imposed normal stress that also affects the state variable.
 
     The field ``alpha`` is described in ``NormalStressWithStateEffect``.
 
@@ -61,7 +61,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
         return 0.0, self.alpha
 
     def parameter_values(self, scene: SceneView) -> FloatTuple:
-        """Return the coefficient of the effect on the state.
+        """Return the coefficient alpha of the effect of normal stress on the state.
 
         See ``Part.parameter_values``.
         """
