@@ -1,4 +1,4 @@
-"""Peak slip rates of successive events, and Floquet multipliers of the cycle.
+"""Measure that computes peak slip rates of successive events and Floquet multipliers.
 
 The measure ``Bifurcation`` integrates a motion event by event. The measure also searches for the
 period-one cycle, which has one event per period, and computes the Floquet multipliers of this
@@ -220,7 +220,7 @@ class Bifurcation(Measure):
     def _event_outputs(
         self, scene: Scene, seen: Sequence[StickSlipCycle]
     ) -> dict[str, float | np.ndarray]:
-        """Return the results of the recorded events."""
+        """Return the results that are computed from the recorded events."""
         peaks = np.array([cycle.max_log_slip_rate / LN10 for cycle in seen])
         return {
             "peak_log10_slip_rate": peaks,

@@ -380,7 +380,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrato
         return along(t, y, train(t) / amplitude)[-1]
 
     def fast(t: float, y: np.ndarray) -> float:
-        """Return ln V minus the value at which the event is imminent."""
+        """Return ln V minus the value of ln V at which the event is imminent."""
         return float((y[0] - y[1]) / a - NEGLIGIBLE_TIME_LOG_RATE)
 
     setattr(fast, "terminal", True)  # noqa: B010  # attribute required by SciPy

@@ -106,7 +106,7 @@ class _TransientRecord(NamedTuple):
         return float(MotionRecorder.get_friction_coefficient(self.rows[-1:])[0])
 
     def remaining_transient(self, slip: float) -> float:
-        """Return the remaining transient of friction at a given slip.
+        """Return the part of the friction transient that remains at a given slip.
 
         Parameters
         ----------
@@ -417,7 +417,7 @@ class NormalStressTransient(RecordingMeasure):
         }
 
     def _departure_from_rigid(self, scene: Scene, record: _TransientRecord) -> float:
-        r"""Compute the largest difference between friction and the closed form.
+        r"""Compute the largest difference between friction and the closed form for a rigid slider.
 
         The closed form of a rigid slider is :math:`b\,R(-(\alpha/b) \ln r, \delta)`, where
         :math:`R` is the relaxation function of the law. The difference is evaluated at all slips

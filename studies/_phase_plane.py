@@ -105,7 +105,7 @@ def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray)
 
 
 def _stresses_from_friction(scene: Scene, excesses: np.ndarray) -> np.ndarray:
-    """Compute shear stresses from deviations of the friction coefficient from mu_*."""
+    """Compute the shear stresses for given differences of the friction coefficient from mu_*."""
     stresses = (scene.frictional_stress_from_friction(excess) for excess in excesses.tolist())
     return np.array([math.nan if g is None else scene.mu_star + g for g in stresses])
 

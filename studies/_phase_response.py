@@ -1,8 +1,8 @@
-r"""Phase response of a limit cycle, and recurrence times under weak noise.
+r"""Measures that compute the effect of weak noise on recurrence times from the phase response.
 
 A small change of the spring stress :math:`f` at some point of the cycle shifts all later events in
-time. For each unknown, the phase response :math:`Z` is the time by which later events occur
-earlier, per unit change of the unknown. The phase response is the periodic solution of the adjoint
+time. For each unknown, the phase response :math:`Z` is the time by which all later events are
+advanced per unit change of the unknown. The phase response is the periodic solution of the adjoint
 of the linearised equations :math:`dy/dt = F(y)`,
 
 .. math::
@@ -155,12 +155,12 @@ class _AdjointSolution:
         return float(self.start.duration - y[-1])
 
     def _flow(self, y: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return the time derivatives of the unknowns, and the time per path length."""
+        """Return the time derivatives of the unknowns, and the time per unit path length."""
         rates = self._rates((*y.tolist(), 0.0), self._p)
         return np.array(rates[:-1]) / rates[-1], rates[-1]
 
     def _adjoint_rates(self, length: float, values: np.ndarray) -> np.ndarray:
-        """Return the derivatives of Z and of the integrals of the squared responses."""
+        """Return the derivatives of the response Z and of the integrals of squared responses."""
         y = self._orbit.sol(length)[:-1]
         z = values[: len(y)]
         slowness = self._flow(y)[1]
@@ -220,7 +220,7 @@ def compute_phase_response(scene: Scene) -> Outcome:
 
 @dataclass(frozen=True)
 class NoisyRecurrence(EventStatistics):
-    """Statistics of the events, and predictions for weak noise in the shear stress.
+    """Measure that computes event statistics and predicts the effect of weak shear stress noise.
 
     The fields are described in ``EventStatistics``.
     """
@@ -238,7 +238,7 @@ class NoisyRecurrence(EventStatistics):
     )
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the statistics of the events and the theoretical predictions.
+        """Compute the statistics of the events, and add the theoretical predictions.
 
         See ``EventStatistics.compute``.
         """

@@ -444,7 +444,7 @@ def _build_rows(pieces: Sequence[_ProtocolSegment]) -> tuple[np.ndarray, np.ndar
 
 @lru_cache(maxsize=8)
 def _noise_factor(process: str, rows: int) -> np.ndarray:
-    """Return the matrix that converts white noise to noise of a correlated process."""
+    """Return the matrix that converts white noise to correlated noise of a given process."""
     return np.asarray(np.linalg.cholesky(toeplitz(_correlations(process, rows))))
 
 

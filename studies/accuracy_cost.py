@@ -1,4 +1,4 @@
-"""Accuracy and cost: measured error against work for several integrators.
+"""Measured error as a function of the work for several integrators.
 
 Several problems with answers that are known to 12 or more digits are solved with each integrator of
 SciPy and at several requested accuracies. Limit cycles are also solved with pairs of integrators.
@@ -140,7 +140,7 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class WorkPrecision(ProblemMeasure):
-    """Error, work and processor time of an integrator for a known problem.
+    """Error, work and processor time of an integrator that solves a known problem.
 
     The processor time is also reported relative to the processor time of the default integrator
     with 3 requested digits. The default integrator solves the same problem immediately before and
@@ -323,7 +323,7 @@ DEFAULT_INTEGRATOR = "DOP853"
 
 
 def plot_unreachable_accuracy(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw the uncertainty of the known answer, and mark the failed runs.
+    """Draw a line at the uncertainty of the known answer, and mark the failed runs.
 
     Failed runs are marked with crosses at the requested accuracy.
 

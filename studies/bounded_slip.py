@@ -1,4 +1,4 @@
-"""Bounded slip rates after velocity steps, slowness law (Figs. 8 and 12).
+"""Bounded slip rates after velocity steps under the slowness law (Figs. 8 and 12).
 
 Under the slowness law and with k >= k_cr, the slip rate remains bounded after every velocity step,
 even without inertia. At constant normal stress and k = k_cr, the oscillations continue without
@@ -115,7 +115,7 @@ class PathSeparation(Reduction):
         )
 
     def _compare(self, rates: np.ndarray, stresses: np.ndarray) -> tuple[float, float, float]:
-        """Return the slip rates at which paths separate and merge, and the stress offset."""
+        """Return the slip rates at which paths separate and merge, and the median stress offset."""
         if not (np.isfinite(rates).all() and np.isfinite(stresses).all()):
             return np.nan, np.nan, np.nan
         one, other = (_branches(rate, stress) for rate, stress in zip(rates, stresses, strict=True))
@@ -134,7 +134,7 @@ class PathSeparation(Reduction):
 def _stress_difference(
     one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the difference of stress between two branches.
+    """Compute the stress difference between two branches at the same slip rates.
 
     Parameters
     ----------

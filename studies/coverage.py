@@ -153,7 +153,7 @@ class Coverage(Measure):
 def _compare_errors(
     measured: Mapping[str, Any], truth: Mapping[str, Any], rtol: float
 ) -> dict[str, np.ndarray]:
-    """Compute the ratios of errors to their estimates and to the tolerance.
+    """Divide the measured errors by the error estimates and by the tolerance.
 
     The uncertainty of the reference results is subtracted from the errors.
 

@@ -55,7 +55,7 @@ def parameter_symbol(row: xr.Dataset) -> str:
 
 
 def machine_title(dataset: xr.Dataset) -> str:
-    """Return the title of a panel with the stiffness of the machine.
+    """Return a panel title that contains the stiffness of the machine.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ figure = Figure(
 
 
 def expected_error_claim(design: str, k: float, published: float) -> Claim:
-    """Return a claim about the expected standard error of the exponent (D1).
+    """Return a claim about the standard error that is expected for the exponent (D1).
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def expected_error_claim(design: str, k: float, published: float) -> Claim:
 
 
 def fit_error_claim(k: float, parameter: str) -> Claim:
-    """Return the claim that fits have the expected standard errors (D2).
+    """Return the claim that estimates scatter by the expected standard error (D2).
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ def drained_critical_stiffness(dataset: xr.Dataset) -> float:
 
 
 def plot_limits(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw the drained limit of k_cr, and the undrained limits at slow drainage.
+    """Draw lines at the drained limit of k_cr and, for slow drainage, at the undrained limits.
 
     Parameters
     ----------

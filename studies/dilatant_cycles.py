@@ -61,7 +61,7 @@ LINEAR_TIME_RANGE = 1e-6
 
 
 def plot_undrained_stiffness(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw a line at the dilatancy at which k is the undrained critical stiffness.
+    """Draw a line at the dilatancy for which the undrained critical stiffness equals k.
 
     Parameters
     ----------

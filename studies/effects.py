@@ -1,4 +1,4 @@
-"""Cost of physical effects in a limit cycle, and error if an effect is neglected.
+"""Computational cost of physical effects, and the error that results if they are neglected.
 
 The study combines all normal stress conditions with all types of dynamics, for both laws at k = 0.8
 k_cr. Without inertia and radiation damping, the slip rate is unbounded, except under the slowness
@@ -6,8 +6,8 @@ law at variable normal stress, where it reaches 10^13 to 10^19 V_*. A cycle with
 needs half as many right-hand-side evaluations as a cycle with inertia. However, a cycle with
 radiation damping has no overshoot, so the static stress drop is smaller by 25 to 50 %. Effects that
 the scene does not include add no unknowns and no computing time. The time per right-hand-side
-evaluation is divided by the time for a quasi-static scene at constant normal stress. The timings of
-the two scenes alternate.
+evaluation is divided by the time for a quasi-static scene at constant normal stress. The two scenes
+are timed alternately.
 """
 
 import math
@@ -90,7 +90,7 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class EffectCost(Measure):
-    """Limit cycle with the computational cost of its physical effects.
+    """Measure that computes a limit cycle and the computational cost of its physical effects.
 
     The number of unknowns and the time of a right-hand-side evaluation are reported separately for
     the equations between ruptures and during ruptures. The results also include the fraction of
@@ -105,7 +105,7 @@ class EffectCost(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the limit cycle and the cost of the equations.
+        """Compute the limit cycle, and measure the cost of evaluating the equations.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class EffectCost(Measure):
 
 
 def _measure_costs(scene: Scene) -> dict[str, float]:
-    """Measure the cost of the equations of a scene.
+    """Count the unknowns of a scene, and time the evaluation of its equations.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ figure = Figure(
 
 
 def static_drop_loss_claim(law: str, dynamics: str, published: float) -> Claim:
-    """Return the claim that the static drop is smaller without inertia (E1).
+    """Return the claim that the static stress drop is smaller without inertia (E1).
 
     Parameters
     ----------

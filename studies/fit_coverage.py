@@ -126,7 +126,7 @@ class ShareFlagged(Reduction):
 
 
 def plot_shares(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Plot the fraction of intervals that contain the exact value, by kind of noise.
+    """Plot the fraction of intervals that contain the exact value for each kind of noise.
 
     Each parameter has a different marker. Full markers show the intervals of the fit, and open
     markers show the intervals of the usual formula.
@@ -180,7 +180,7 @@ def figure_height(dataset: xr.Dataset) -> float:
 
 
 def coverage_claims(series: str, words: str, **where: str) -> list[Claim]:
-    """Return the claims that 68.3 % and 95.4 % intervals have nominal coverage.
+    """Return the claims that 68.3 % and 95.4 % intervals have at least this coverage.
 
     Parameters
     ----------

@@ -266,12 +266,12 @@ def _friction_by_scipy(model: WindowModel, true: ParameterValues) -> np.ndarray:
 
 
 def _parameter_scale(name: str, true: ParameterValues) -> float:
-    """Return the scale of the deviations of a parameter.
+    """Return the scale by which the deviations of a parameter are divided.
 
-    Deviations of a parameter are divided by the scale. If the logarithm of a parameter is fitted,
-    the scale is the exact value of the parameter. The scale of the deviations of ``a`` and ``b`` is
-    the larger of the absolute values of ``a`` and ``b``. The scale of the deviations of a trend is
-    the trend that changes friction by 1 over the window. The scale is 1 for all other parameters.
+    If the logarithm of a parameter is fitted, the scale is the exact value of the parameter. The
+    scale for ``a`` and ``b`` is the larger of the absolute values of ``a`` and ``b``. The scale for
+    a trend is the trend that changes friction by 1 over the window. The scale is 1 for all other
+    parameters.
     """
     if name in LOGARITHMIC_PARAMETERS:
         return true[name]

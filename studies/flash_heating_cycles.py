@@ -46,7 +46,7 @@ def cycle_claim(variable: str, velocity: float, friction: float, value: float) -
 
 
 def plot_complete_drop(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw the difference between the friction at V_* and the weakened friction.
+    """Draw a line that shows the friction at V_* minus the friction of weakened contacts.
 
     Parameters
     ----------

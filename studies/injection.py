@@ -1,4 +1,4 @@
-"""Slow fluid injection and the stability of steady sliding.
+"""Effect of slow fluid injection on the stability of steady sliding.
 
 Pore pressure around the fault rises slowly and falls again, according to a sampled record. The
 fault is either drained or dilatant. The pores of the dilatant fault drain into the surroundings at
@@ -73,7 +73,7 @@ _OUTPUTS = (
 
 
 def critical_stiffness(scene: Scene, pressure: float, velocity: float) -> float:
-    r"""Compute the critical stiffness at a pore pressure and a slip rate.
+    r"""Compute the critical stiffness at a given pore pressure and slip rate.
 
     The parameter alpha must be zero. Let :math:`P` be the pore pressure and :math:`s = 1 - P` the
     effective normal stress, both in units of :math:`\sigma_*`. The critical stiffness of a drained
@@ -334,7 +334,7 @@ def max_pressure_rate(lasts: float) -> float:
 
 
 def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
-    """Return the claim that k equals k_cr when growth stops or starts (I1).
+    """Return the claim that k equals k_cr when perturbations stop or start to grow (I1).
 
     Parameters
     ----------
@@ -367,7 +367,7 @@ def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
 
 
 def critical_pressure_claim(at: str, law: str, case: str, within: float, reason: str) -> Claim:
-    """Return the claim that growth stops or starts at the critical pressure (I2).
+    """Return the claim that growth stops or starts at the critical pore pressure (I2).
 
     Parameters
     ----------
@@ -417,7 +417,7 @@ RATE_REASON = (
 
 
 def pressure_panel(at: str) -> Panel:
-    """Return a panel of the pore pressures at which growth stops or starts.
+    """Return a panel of the pore pressures at which perturbations stop or start to grow.
 
     Parameters
     ----------
@@ -445,7 +445,7 @@ def pressure_panel(at: str) -> Panel:
 
 
 def plot_critical_pressure(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw the critical pressure at V_0 as a function of drainage.
+    """Draw the critical pore pressure at V_0 as a function of the drainage rate.
 
     The value of a drained fault is drawn as a dotted line.
 
@@ -484,7 +484,7 @@ def pressure_rates(row: xr.Dataset) -> xr.DataArray:
 
 
 def plot_one_to_one_line(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw a line that shows the change of pressure during a time of D_c/V_*.
+    """Draw a line that shows how much the pressure changes within the time D_c/V_*.
 
     Parameters
     ----------
@@ -498,7 +498,7 @@ def plot_one_to_one_line(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
 
 
 def stiffness_deviation_panel(at: str) -> Panel:
-    """Return a panel of deviations from the critical stiffness.
+    """Return a panel that shows how much k differs from the critical stiffness.
 
     The critical stiffness is evaluated at the current pressure and slip rate.
 

@@ -68,7 +68,7 @@ def experiment_name(normal_stress: float, noise: str) -> str:
 
 
 def interval_cv_claim(normal_stress: float, variation: float, tolerance: float) -> Claim:
-    """Return a claim about the CV of alternating intervals (L1).
+    """Return a claim about the CV of alternating long and short intervals (L1).
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def interval_cv(row: xr.Dataset) -> xr.DataArray:
 
 
 def plot_published(_dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw the CV of the stochastic model of the paper and of the experiments.
+    """Draw the published CVs: from the stochastic model of the paper and from experiments.
 
     Parameters
     ----------

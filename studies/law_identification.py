@@ -153,7 +153,7 @@ figure = Figure(
 
 
 def design_claims(design: str) -> list[Claim]:
-    """Return the claims about the standard error of a design (I1 and I2).
+    """Return the claims about the standard error for an experimental design (I1 and I2).
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ def critical_displacement_claim(
 
 
 def variable_normal_stress_claim(law: str, published: float) -> Claim:
-    """Return a claim about the influence of variable normal stress (L4).
+    """Return a claim about the effect of variable normal stress on the critical step (L4).
 
     Parameters
     ----------

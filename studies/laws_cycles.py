@@ -88,7 +88,7 @@ def dynamic_drop_claim(law: str) -> Claim:
 
 
 def slip_rate_claim(law: str, relation: str, decades: float) -> Claim:
-    """Return a claim about the minimum slip rate at variable normal stress (L11).
+    """Return a claim about how much variable normal stress lowers the minimum slip rate (L11).
 
     The paper reports a decrease of ten decades for the slip law.
 

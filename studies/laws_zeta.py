@@ -22,7 +22,7 @@ from ._paper import PAPER, REFERENCE
 
 
 def zeta_claim(exponent: float) -> Claim:
-    """Return the claim that zeta equals the closed form (L7).
+    """Return the claim that zeta equals its closed form, 1/(1 - eps) (L7).
 
     Parameters
     ----------

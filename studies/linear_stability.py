@@ -3,9 +3,10 @@
 Steady sliding is stable under small perturbations if the stiffness lies above the curve, and
 unstable if the stiffness lies below the curve. The critical stiffness decreases with slip rate, and
 the decrease is steeper for small angles between the driving stress and the normal of the fault. If
-phi < atan(mu_ss), there is no steady state. A faster load point can therefore stabilise a spring,
-and a slower load point can destabilise it. Inertia raises the critical stiffness in proportion to
-(T V)**2. For T = 5 s, the relative increase is at most 6e-5, at a slip rate of 10^6 V_*.
+phi < atan(mu_ss), there is no steady state. Because the critical stiffness decreases with slip
+rate, a faster load point can stabilise steady sliding, and a slower load point can destabilise it.
+Inertia raises the critical stiffness in proportion to (T V)**2. For T = 5 s, the relative increase
+is at most 6e-5, at a slip rate of 10^6 V_*.
 """
 
 import math
@@ -63,7 +64,7 @@ def growth_threshold_claim(mass: str, phi: float, rate: float) -> Claim:
 
 
 def steepness_claim(phi: float, gentler: float) -> Claim:
-    """Return the claim that the curve is steeper for a smaller angle (C1).
+    """Return the claim that k_cr decreases more steeply with V for a smaller angle (C1).
 
     Parameters
     ----------
@@ -117,7 +118,7 @@ def critical_stiffness_curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def plot_slowest_steady_rate(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw dotted lines at the lowest slip rate of steady sliding.
+    """Draw dotted lines at the lowest slip rate at which steady sliding exists.
 
     Parameters
     ----------
@@ -140,7 +141,7 @@ def plot_slowest_steady_rate(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
 
 
 def angle_label(row: xr.Dataset) -> str:
-    """Return a label with the driving angle and the stabilising slip rate.
+    """Return a label with the driving angle and the slip rate above which sliding is stable.
 
     The stiffness of the spring is 0.8 k_cr(V_*).
 

@@ -133,7 +133,7 @@ def theory_claim(variable: str, value: float, statement: str) -> Claim:
 
 
 def plot_theory(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw the CV of the theory for weak noise.
+    """Draw the CV that the theory for weak noise predicts.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def plot_unity(_dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
 
 
 def ratio_to_theory(row: xr.Dataset) -> xr.DataArray:
-    """Return the mean CV divided by the CV of the theory.
+    """Return the mean CV divided by the CV that the theory predicts.
 
     Parameters
     ----------

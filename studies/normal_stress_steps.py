@@ -52,7 +52,7 @@ def initial_log_rate(step: float) -> float:
 
 
 def remaining_transient(law: str, step: float, ratio: float, slip: float) -> float:
-    r"""Compute the remaining transient of friction, to first order in a/K.
+    r"""Compute the friction transient that remains at a given slip, to first order in a/K.
 
     Let :math:`r` be one plus the step of normal stress, and :math:`\delta` the slip in :math:`D_c`.
     The transient of a rigid slider is :math:`-\alpha \ln r \, e^{-\delta}` under the slip law.

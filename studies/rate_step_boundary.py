@@ -89,7 +89,7 @@ figure = Figure(
 
 
 def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
-    """Return a claim about the effect of variable normal stress (C7).
+    """Return a claim about how much variable normal stress reduces the critical step (C7).
 
     Parameters
     ----------

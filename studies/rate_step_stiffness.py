@@ -33,7 +33,7 @@ from ._paper import (
 def section_4_claim(
     stiffness_ratio: float, published: float, tolerance: float, digits: str
 ) -> Claim:
-    """Return a claim about a critical step of section 4 (C17).
+    """Return a claim about a critical step in section 4 of the paper (C17).
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def section_4_claim(
 
 
 def eq_11_claim(stiffness_ratio: float, published: float, tolerance: float, reason: str) -> Claim:
-    """Return a claim about the ratio of the critical step to eq. 11 (C8).
+    """Return a claim about the critical step divided by the value of eq. 11 (C8).
 
     Parameters
     ----------

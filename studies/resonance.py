@@ -156,7 +156,7 @@ def resonance_claim(law: str, period: float) -> Claim:
 
 
 def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Claim:
-    """Return a claim about the validity of linear theory (R3).
+    """Return the claim that linear theory is, or is not, valid at a given amplitude (R3).
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def failure_order_claim(softer: float, stiffer: float) -> Claim:
 def linear_theory_line(
     part: Callable[[np.ndarray], Any], row: xr.Dataset
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the response of linear theory at closely spaced periods.
+    """Compute the response that linear theory predicts at closely spaced periods.
 
     The periods extend beyond the range of the results by a factor of two.
 
@@ -269,7 +269,7 @@ def phase_lead(responses: np.ndarray) -> Any:
 
 
 def settled_values(variable: str, row: xr.Dataset) -> xr.DataArray:
-    """Return the values of a variable in cells with a settled response.
+    """Return the values of a variable in the cells in which the response has settled.
 
     Parameters
     ----------

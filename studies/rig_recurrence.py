@@ -41,7 +41,7 @@ TOLERANCE_REASON = (
 
 
 def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
-    """Return a claim about the slope of a stress drop under the slip law (S1).
+    """Return a claim about how a stress drop varies with ln V_0 under the slip law (S1).
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
 
 
 def slowness_law_drop_claim(stress: float) -> Claim:
-    """Return a claim about the static drop under the slowness law (S2).
+    """Return a claim about the static stress drop under the slowness law (S2).
 
     If ln V_0 increases by 1, the static drop decreases by more than 2 (b-a) sigma. The reason is
     that the state increases throughout the interval between events, and this interval is shorter at

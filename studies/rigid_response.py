@@ -24,7 +24,7 @@ STEPS = [1e-4, 1e-3, 1e-2, 1e-1, 1.05, 1e1, 1e2, 200.0, 1e3, 1e4]
 
 
 def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Claim:
-    """Return the claim that variable normal stress slows evolution (C3, C4).
+    """Return the claim that variable normal stress slows the stress evolution (C3, C4).
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Cl
 
 
 def remaining_stress(row: xr.Dataset) -> xr.DataArray:
-    """Return the difference between stress and its final steady value.
+    """Return the difference between the shear stress and the final steady shear stress.
 
     Parameters
     ----------

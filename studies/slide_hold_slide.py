@@ -1,11 +1,11 @@
 """Healing and relaxation in slide-hold-slide tests.
 
 After steady sliding at V_*, the load point stops for the hold time, and then moves at V_* again.
-Under the slowness law with b > a, relaxation approaches a limit that depends on stiffness. Healing
-increases by b ln 10 per decade of hold time at every stiffness. Without rate weakening, relaxation
-has no limit. Under the slip law, relaxation has no limit either, and the healing per decade
-decreases with stiffness. The values that are measured in such tests therefore depend on the machine
-as much as on the fault.
+Under the slowness law with b > a, relaxation approaches a limit as the hold time increases, and
+this limit depends on stiffness. Healing increases by b ln 10 per decade of hold time at every
+stiffness. Without rate weakening, relaxation increases without limit. Under the slip law,
+relaxation has no limit either, and the healing per decade decreases with stiffness. The values that
+are measured in such tests therefore depend on the machine as much as on the fault.
 """
 
 import math
@@ -34,7 +34,7 @@ CLOSED_FORM_SOURCE = "stationary contact in closed form: slowness law, quasi-sta
 
 
 def relaxation_claim(ratio: float) -> Claim:
-    """Return a claim about the limit of relaxation (P1).
+    """Return a claim about the limit that relaxation approaches in a long hold (P1).
 
     Parameters
     ----------

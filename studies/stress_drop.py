@@ -1,12 +1,13 @@
 """Static and dynamic stress drops against ln V_0 (section 3.5).
 
 Stress drops of limit cycles decrease with the logarithm of load point velocity. Under the slip law
-and at constant normal stress, the slopes over three decades are close to 2 (a-b) sigma_* (static)
-and (a-b) sigma_* (dynamic). At variable normal stress, the slopes are close to these values divided
-by 1 - mu_* cot(phi). Under the slowness law, the slopes depend on stiffness. At variable normal
-stress, separate fits at low and at high velocities show that the slope depends on velocity. At phi
-= 50 degrees, k_cr decreases so much with V that stick-slip does not occur at high velocities. The
-fits ignore cells without stick-slip and report the number of points.
+and at constant normal stress, the slopes over three decades of load point velocity are close to 2
+(a-b) sigma_* (static) and (a-b) sigma_* (dynamic). At variable normal stress, the slopes are close
+to these values divided by 1 - mu_* cot(phi). Under the slowness law, the slopes depend on
+stiffness. At variable normal stress, separate fits at low and at high velocities show that the
+slope depends on velocity. At phi = 50 degrees, k_cr decreases so much with V that stick-slip does
+not occur at high velocities. The fits ignore cells without stick-slip and report the number of
+remaining cells.
 """
 
 import math
@@ -43,7 +44,7 @@ def _normal_stress_term(case: str) -> str:
 
 
 def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law: str) -> Claim:
-    """Return a claim about a slope under the slip law at 0.8 k_cr (C15).
+    """Return a claim about the slope of a drop under the slip law at k = 0.8 k_cr (C15).
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law
 
 
 def slowness_law_drop_claim(case: str) -> Claim:
-    """Return the claim that drops decrease under the slowness law (C16).
+    """Return the claim that the static drop decreases with ln V_0 under the slowness law (C16).
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def slowness_law_drop_claim(case: str) -> Claim:
 
 
 def slope_reductions(drop: str) -> list[Reduction]:
-    """Return the reductions for the slopes of a stress drop.
+    """Return the reductions that compute the slopes of a stress drop.
 
     Parameters
     ----------
@@ -195,7 +196,7 @@ def curve_name(drop: str, row: xr.Dataset) -> str:
 
 
 def scaled_slope(row: xr.Dataset) -> xr.DataArray:
-    """Return the slopes of the static drop in (a-b) sigma_* for each stiffness.
+    """Return the slope of the static stress drop, in (a-b) sigma_*, at each stiffness.
 
     Parameters
     ----------

@@ -111,7 +111,7 @@ def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, rea
 
 
 def coulomb_limit_claim(law: str, case: str) -> Claim:
-    """Return the claim that triggers need equal Coulomb stress on soft springs (N2).
+    """Return the claim that both triggers need equal Coulomb stress on soft springs (N2).
 
     Parameters
     ----------
@@ -141,9 +141,10 @@ def coulomb_limit_claim(law: str, case: str) -> Claim:
 
 
 def normal_stress_effect_claim(law: str) -> Claim:
-    """Return the claim that alpha increases the critical decrease (N3).
+    """Return the claim that alpha increases the critical decrease of normal stress (N3).
 
-    Linker and Dieterich (1992) showed that a decrease of normal stress strengthens the state.
+    Linker and Dieterich (1992) showed that a decrease of normal stress increases the state
+    variable, and therefore the friction coefficient.
 
     Parameters
     ----------

@@ -169,7 +169,7 @@ def set_abscissa(magnified: bool) -> DrawFunction:
 
 
 def has_doublings(dataset: xr.Dataset) -> bool:
-    """Return True if enough springs lie in the range of period doubling.
+    """Return True if enough stiffness values lie in the range of period doubling.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def cubic_critical_stiffness(second: float, longer: float) -> float:
 def critical_stiffness_claim(
     second: float, longer: float, says: str, published: float, **held: Any
 ) -> Claim:
-    """Return a claim about the critical stiffness of a pair of states (S7).
+    """Return a claim about the critical stiffness of a law with two states (S7).
 
     Parameters
     ----------

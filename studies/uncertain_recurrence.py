@@ -131,7 +131,7 @@ def net_weakening(row: xr.Dataset) -> xr.DataArray:
 
 
 def plot_quantiles(dataset: xr.Dataset, axes: MatplotlibAxes) -> None:
-    """Draw the median and the range from the 5 % to the 95 % quantile.
+    """Draw the median, and shade the range from the 5 % quantile to the 95 % quantile.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ STEP_DESCRIPTIONS = {0.01: "down by 100", 0.1: "down by 10", 10.0: "up by 10", 1
 
 
 def peak_departure(law: str, ratio: float) -> float:
-    """Compute the difference in peak friction from a rigid slider, in closed form.
+    """Compute how much peak friction differs from the peak of a rigid slider, in closed form.
 
     The closed form is of first order in a/K. The difference has two causes. First, the evolution is
     incomplete while slip accelerates. Second, the slider moves faster than the load point while
@@ -57,7 +57,7 @@ def peak_departure(law: str, ratio: float) -> float:
 
 
 def rigid_limit_claim(law: str, ratio: float) -> Claim:
-    """Return a claim about the difference from a rigid slider (P6).
+    """Return a claim about how much friction differs from the friction of a rigid slider (P6).
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def friction_change(row: xr.Dataset) -> xr.DataArray:
 def reading_panel(
     title: str, label: str, name: str, over: tuple[str, ...] = (), alike: str = ""
 ) -> Panel:
-    """Return a panel of an estimate relative to its exact value.
+    """Return a panel of an estimate divided by the exact value.
 
     Parameters
     ----------

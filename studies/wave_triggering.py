@@ -129,7 +129,7 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
 
 
 def coulomb_limit_claim(law: str, phase: float) -> Claim:
-    """Return the claim that slow waves trigger events at a Coulomb threshold (W2).
+    """Return the claim that slow waves trigger events at a Coulomb stress threshold (W2).
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def coulomb_limit_claim(law: str, phase: float) -> Claim:
 
 
 def strong_waves_claim(law: str) -> Claim:
-    """Return the claim that strong waves trigger events at a Coulomb threshold (W3).
+    """Return the claim that strong waves trigger events at a Coulomb stress threshold (W3).
 
     Strong waves increase Coulomb stress faster than the load point does.
 
@@ -222,7 +222,7 @@ def early_train_claim(amplitude: float) -> Claim:
 
 
 def coulomb_error_claim(law: str) -> Claim:
-    """Return the claim that the Coulomb threshold fails for fast waves (W5).
+    """Return the claim that a Coulomb stress threshold does not hold for fast waves (W5).
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ class Headlines(Measure):
 
 
 def interval_claim(name: str, order: str, end: str) -> Claim:
-    """Return the claim that a confidence interval contains 1/2 (W1).
+    """Return the claim that a confidence interval begins below, or ends above, 1/2 (W1).
 
     Parameters
     ----------

@@ -116,7 +116,7 @@ class UnitNoisePath(NamedTuple):
         return np.array(values[:stop_sample_index])
 
     def _compute_decay_and_innovation_deviation(self, time_step: float) -> tuple[float, float]:
-        """Return the decay factor for one time step, and the deviation of the added noise."""
+        """Return the decay factor of one step, and the standard deviation of the added noise."""
         if self.correlation_time is None:
             return 1.0, math.sqrt(time_step)
         decay = 2.0 * time_step / self.correlation_time

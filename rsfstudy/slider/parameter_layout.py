@@ -128,7 +128,7 @@ def pack_friction_parameter_values(scene: SceneView) -> FloatTuple:
 
 
 def pack_temperature_parameter_values(scene: SceneView) -> FloatTuple:
-    """Return the parameters in the equations for the fault temperature.
+    """Return the parameters that the equations for the fault temperature use.
 
     Parameters
     ----------

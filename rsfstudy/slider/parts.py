@@ -365,7 +365,7 @@ def list_part_field_names(part_class: type[Part]) -> tuple[str, ...]:
 
 @cache
 def _list_fields_appended_to_parameters(part_class: type[Part]) -> tuple[str, ...]:
-    """Return the names of the fields whose values follow ``parameter_values``.
+    """Return the names of the fields whose values are appended to ``parameter_values``.
 
     A field is appended if it is numeric and is declared in a subclass of the class that defines
     ``parameter_values``.
@@ -423,7 +423,7 @@ def list_part_field_quantities(part_class: type[Part]) -> list[Quantity]:
 def _get_field_validation_rule(
     part_class: type[Part], field_name: str
 ) -> tuple[Any, str, str, Callable[[float], bool] | None]:
-    """Return the default, rule, remedy and condition of a field."""
+    """Return the default of a field, and the rule, remedy and condition for its values."""
     stated = part_class.__dataclass_fields__[field_name]
     rule = stated.metadata["rule"]
     return stated.default, rule, stated.metadata["remedy"], CONDITION_BY_VALUE_RULE.get(rule)

@@ -89,7 +89,7 @@ def build_rate_functions_between_ruptures(
     *,
     allows_reversed_slip: bool,
 ) -> tuple[NumericFunction, NumericFunction, NumericFunction]:
-    """Return the rate functions of a scene between ruptures.
+    """Return the functions that compute the rates of the unknowns between ruptures.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def build_rate_functions_in_rupture(
     friction_functions: FrictionFunctions,
     build_rate_function_for_ruptures: Callable[[FrictionFunctions], NumericFunction],
 ) -> tuple[NumericFunction, NumericFunction, NumericFunction]:
-    r"""Return the rate functions of a scene in ruptures.
+    r"""Return the functions that compute the rates of the unknowns in ruptures.
 
     Parameters
     ----------
@@ -182,9 +182,9 @@ def build_rate_functions_in_rupture(
 
 
 def _add_noise_to_rupture_rates(rupture_rate_function: NumericFunction) -> NumericFunction:
-    """Add noise in the spring stress to a rate function for ruptures.
+    """Extend a rate function for ruptures so that the spring stress contains noise.
 
-    The last two parameters of a scene with noise are the inertial time and the rate of the noise.
+    If a scene has noise, its last two parameters are the inertial time and the noise rate.
     """
 
     def rates_with_noise(state: FloatTuple, p: FloatTuple) -> FloatTuple:
@@ -196,7 +196,7 @@ def _add_noise_to_rupture_rates(rupture_rate_function: NumericFunction) -> Numer
 
 @cache
 def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -> NumericFunction:
-    r"""Return the rate function of a rigid slider.
+    r"""Return the function that computes the rates of the unknowns of a rigid slider.
 
     The returned function ``(state, p) -> tuple`` computes derivatives with respect to slip. The
     tuple contains the derivative of g, followed by the derivatives of all states except the first.

@@ -138,8 +138,8 @@ def _find_critical_stiffnesses(
 ) -> list[float]:
     """Find all critical stiffnesses above a given minimum.
 
-    At a critical stiffness, a growth rate is imaginary. The stiffnesses are in ascending order. A
-    critical stiffness that inertia makes infinite is included as ``math.inf``.
+    At a critical stiffness, a pair of growth rates is purely imaginary. The stiffnesses are in
+    ascending order. If inertia makes a critical stiffness infinite, the list contains ``math.inf``.
     """
     # For p = i omega, the polynomials depend on omega**2 only.
     (a_even, a_odd), (b_even, b_odd) = (
@@ -369,7 +369,7 @@ def compute_spring_response_to_normal_stress(
 
 
 def _compute_steady_sliding_or_raise(scene: SceneView, log_slip_rate: float) -> SteadySliding:
-    """Compute steady sliding, or raise ``ValueError`` if steady sliding does not exist."""
+    """Compute the state of steady sliding, or raise ``ValueError`` if it does not exist."""
     steady = compute_steady_sliding(scene, log_slip_rate)
     if steady is None:
         raise ValueError(f"steady sliding does not exist at ln(V/V_*) = {log_slip_rate:g}")

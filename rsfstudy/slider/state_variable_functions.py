@@ -1,10 +1,10 @@
-"""State variables of a scene: evolution, steady states and sums.
+"""Functions that compute the evolution, the steady states and the sums of state variables.
 
-The tuple of states starts with the states of the law, whose sum acts on friction. If the loading
-changes normal stress, the unknowns of the loading follow the states of the law. The unknowns of a
-fluid come last. The last unknown is the pore pressure P, or the stress that the loading imposes.
-Most functions of this module return other functions. The returned functions are specialised for the
-number of states, so that Numba can compile them.
+The tuple of states starts with the states of the law. The sum of these states acts on friction. If
+the loading changes normal stress, the unknowns of the loading follow the states of the law. The
+unknowns of a fluid come last. The last unknown is the pore pressure P, or the stress that the
+loading imposes. Most functions of this module return other functions. The returned functions are
+specialised for the number of states, so that Numba can compile them.
 """
 
 from __future__ import annotations
@@ -218,7 +218,7 @@ def build_tuple_scaling_function(component_count: int) -> NumericFunction:
 
 @cache
 def build_function_adding_state_changes(state_count: int) -> NumericFunction:
-    """Return a function that adds a multiple of the state changes to the states.
+    """Return a function that multiplies the state changes by a number and adds them to the states.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-r"""Evolution of the temperature rise, and its effects on friction.
+r"""Functions that compute the temperature rise and the effect of temperature on friction.
 
-The temperature rise :math:`\vartheta` is the first element of the tuple of states after the states
-of the law. With :math:`\Lambda = -\vartheta/(1 + \vartheta)`, the state :math:`\Psi = \Theta +
+In the tuple of states, the temperature rise :math:`\vartheta` directly follows the states of the
+law. With :math:`\Lambda = -\vartheta/(1 + \vartheta)`, the state :math:`\Psi = \Theta +
 \mathrm{shift}_\sigma(g)`, in which :math:`\mathrm{shift}_\sigma` is the decrease in the state
 variable due to stress, obeys
 
@@ -57,7 +57,7 @@ _MAX_SECANT_COUNT, _ROOT_TOLERANCE, _STAGNATION_TOLERANCE = 30, 1e-14, 1e-10
 
 
 class _TemperatureIndices(NamedTuple):
-    """Indices of the temperature in the tuples of states and parameters.
+    """Indices of the temperature and its parameters in the tuples of states and parameters.
 
     The index of the state is negative. The index ``parameter_end_index`` is one greater than the
     index of the last parameter.
@@ -136,7 +136,7 @@ def build_temperature_dependent_functions(
 
 
 def compute_inverse_temperature_change(temperature_rise: float) -> float:
-    r"""Compute the change in the inverse temperature.
+    r"""Compute the change in the inverse temperature due to a temperature rise.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def compute_inverse_temperature_change(temperature_rise: float) -> float:
 def compute_thermal_friction_derivatives(
     temperature_rise: float, temperature_parameters: FloatTuple
 ) -> tuple[float, float]:
-    r"""Compute the derivatives of strength and shift with respect to temperature.
+    r"""Compute the derivatives of the strength and of the shift with respect to temperature.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def compute_thermal_friction_derivatives(
 def _add_temperature_effect_to_strength(
     strength_function: NumericFunction, temperature_indices: _TemperatureIndices
 ) -> NumericFunction:
-    """Return a friction relation that includes both activation terms."""
+    """Return a strength function that includes both temperature-dependent activation terms."""
     place, first, second = (
         temperature_indices.state_index,
         temperature_indices.first_parameter_index,
@@ -198,7 +198,7 @@ def _add_temperature_effect_to_strength(
 def _add_temperature_to_state_contribution(
     contribution_function: NumericFunction, temperature_indices: _TemperatureIndices
 ) -> NumericFunction:
-    """Return a function that computes the friction change due to states and temperature."""
+    """Return a function that computes how the states and the temperature change the friction."""
     place, first, end = (
         temperature_indices.state_index,
         temperature_indices.first_parameter_index,
@@ -267,7 +267,7 @@ def _build_temperature_rate_function(
     law_state_count: int,
     temperature_indices: _TemperatureIndices,
 ) -> NumericFunction:
-    r"""Return a function that computes the rate of the temperature rise.
+    r"""Return a function that computes the rate of change of the temperature rise.
 
     The arguments of the returned function are ``(x, psis, shift, fraction, p)``. The friction
     coefficient is :math:`\mu = \mu_* + a \ln V + \Psi - \mathrm{shift} - (b q_b - a q_a) \Lambda`.
@@ -358,7 +358,7 @@ def _insert_nan_for_steady_temperature(
 
 @cached_per_scene
 def compute_steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
-    r"""Compute the temperature rise of steady sliding.
+    r"""Compute the temperature rise in steady sliding at a given slip rate.
 
     At a given slip rate, steady sliding may be possible at several temperatures. The function
     selects the temperature rise that changes continuously from zero as the slip rate changes from

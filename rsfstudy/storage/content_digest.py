@@ -5,8 +5,8 @@ file stores this digest in an attribute, so the digest is preserved if another p
 file. A second digest, which is stored at the end of the file, is computed from all bytes of the
 file. The digest at the end is lost if the file is truncated or if another program saves the file.
 The digest of the contents is needed because HDF5 stores no checksums of the data or of attributes
-larger than 4 kB, such as a long declaration. HDF5 only stores checksums of small attributes, names
-and shapes.
+larger than 4 kB, such as a long declaration. HDF5 stores checksums only for names, shapes and small
+attributes.
 """
 
 from __future__ import annotations
@@ -92,8 +92,8 @@ def _build_damaged_file_error(path: str, part_name: str) -> DataError:
 def _compute_variable_and_attribute_digests(dataset: xr.Dataset) -> dict[str, str]:
     """Compute one digest for each variable and each attribute.
 
-    The entry of a variable consists of its sizes, units and scale, followed by the digest of its
-    values.
+    The entry of a variable contains the sizes, units and scale of the variable, followed by the
+    digest of the values.
     """
     texts = {
         name: str(dataset.attrs[name])

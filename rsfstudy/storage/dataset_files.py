@@ -1,4 +1,4 @@
-"""Reading and writing of results files.
+"""Functions that read and write results files.
 
 A NetCDF file is written under a temporary name, read back and compared with the dataset. The file
 is renamed only if the contents are identical. Each NetCDF file ends with a digest of all preceding
@@ -204,7 +204,7 @@ def _check_zarr_store_digest(path: Path) -> bool:
 
 
 def _check_digest_at_file_end(path: Path) -> bool:
-    """Check a file against the digest at its end.
+    """Check a file against the digest that is stored at the end of the file.
 
     If the file has no digest at its end, the function returns False.
     """

@@ -1,4 +1,4 @@
-"""Declaration, provenance and scenes of a dataset that rsfstudy has written."""
+"""Class that reads the declaration, provenance and scenes of a dataset."""
 
 from __future__ import annotations
 
@@ -17,9 +17,7 @@ from rsfstudy.study import Study
 
 @dataclass(frozen=True)
 class StoredDataset:
-    """Declaration, provenance and scenes of a dataset.
-
-    Each property reads and checks the attributes of the dataset, and raises ``DataError`` if they
+    """Dataset from which the properties read the declaration, provenance and scenes. Each property reads and checks the attributes of the dataset, and raises ``DataError`` if they
     are missing or damaged.
 
     Parameters
@@ -57,7 +55,7 @@ class StoredDataset:
 
     @property
     def study(self) -> Study:
-        """Complete study, even if the dataset contains only a selection of its cells."""
+        """Study with all of its cells, even if the dataset contains only some of the cells."""
         return study_reconstruction.rebuild_study_without_user_code(self.dataset)
 
     @property
@@ -66,7 +64,7 @@ class StoredDataset:
         return study_reconstruction.find_primary_output_name(self.dataset)
 
     def rebuild_study(self, study_file: str | Path | None = None) -> Study:
-        """Rebuild the study of the results from its declaration.
+        """Rebuild the study that produced the results from the stored declaration.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Reconstruction of a study from the declaration in its results file.
+"""Functions that rebuild a study from the declaration in its results file.
 
 ``rebuild_study`` is the main function. A declaration contains only plain data, so no code from the
 results file is executed. If a study contains user-defined code, the code is imported from the
@@ -226,9 +226,9 @@ def build_study_from_declaration(
 
 
 def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
-    """Return a mapping from names to the parts of a study and all other registered parts.
+    """Return the user-defined parts that are registered or belong to a study, keyed by name.
 
-    The mapping contains only user-defined parts. If the study is None, the mapping is empty.
+    If the study is None, the mapping is empty.
     """
     others = {
         name: part for slot in SceneFields.PART_SLOTS for name, part in slot.user_parts.items()

@@ -28,7 +28,7 @@ def compute_temperature_rate(
     slip_per_independent_variable: float,
     heating_parameters: FloatTuple,
 ) -> float:
-    r"""Compute the rate of the temperature rise.
+    r"""Compute the rate of change of the temperature rise.
 
     Parameters
     ----------
@@ -173,8 +173,8 @@ class ShearHeating(Temperature):
         """Compute bounds on the future temperature rise.
 
         See ``Temperature.compute_temperature_rise_bounds``. At any time, the temperature evolves
-        towards the steady temperature for the current power. The steady temperature lies between
-        the steady temperature without slip and the steady temperature at the largest power.
+        towards the steady temperature for the current heating power. The steady temperature lies
+        between the steady temperature without slip and the steady temperature at the largest power.
         """
         over_cooling = self.heating / self.cooling
         lowest = -over_cooling * scene.mu_star

@@ -1,4 +1,4 @@
-"""Search for the position at which a sampled curve crosses a level.
+"""Functions that find the positions at which a sampled curve crosses a level.
 
 ``find_unique_crossing`` returns the position of a crossing with lower and upper bounds. The bounds
 account for the unknown shape of the curve between two samples.
@@ -194,7 +194,7 @@ def _estimate_slope_changes(
 
 
 def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) -> int:
-    """Count the sign reversals between successive slope changes above a threshold."""
+    """Count how often successive slope changes reverse sign, ignoring small slope changes."""
     counted = slope_changes[np.abs(slope_changes) > min_slope_change]
     return int((counted[1:] * counted[:-1] < 0.0).sum())
 
@@ -202,7 +202,7 @@ def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) ->
 def _compute_crossing_bounds(
     slope: float, total_slope_change: float, interval_width: float, level_minus_first_value: float
 ) -> tuple[float, float] | None:
-    """Return the bounds of a crossing in an interval.
+    """Return bounds on the position of a crossing in an interval.
 
     Positions are measured from the first sample of the interval, and ``level_minus_first_value`` is
     the level minus the value of the first sample. The function returns None if the curve cannot

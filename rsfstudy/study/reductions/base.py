@@ -1,8 +1,8 @@
 """Base class of reductions, and functions that all reductions share.
 
-``Reduction`` is the base class. The functions handle failed cells, coordinate ranges, and the
-propagation of numerical errors from cells to results. A reduction never uses failed cells, unless
-its class sets ``uses_failed_cells``.
+``Reduction`` is the base class. The functions exclude failed cells, select coordinate ranges, and
+propagate numerical errors from cells to results. A reduction never uses failed cells, unless its
+class sets ``uses_failed_cells``.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class Reduction(ConstructorKeywordCheckMixin):
     of: str
 
     def __init_subclass__(cls) -> None:
-        """Set the default of the ``kind`` attribute, and accept former member names."""
+        """Set the default of ``kind``, and accept overrides of members under their former names."""
         super().__init_subclass__()
         copy_former_overrides_to_new_names(cls)
         if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
@@ -236,7 +236,7 @@ def is_failed_or_pending(status: xr.DataArray) -> xr.DataArray:
 def find_worst_status_along_other_dims(
     status: xr.DataArray, kept_dimensions: Collection[Hashable]
 ) -> xr.DataArray:
-    """Return the largest status code along the dimensions that the result does not have.
+    """Return the largest status code over all dimensions that the result does not have.
 
     Failures have the largest status codes.
 
@@ -313,7 +313,7 @@ def depends_on_failed_cells(
 
 
 def set_failed_cells_to_nan(dataset: xr.Dataset) -> xr.Dataset:
-    """Treat failed cells as finished cells without a value.
+    """Set the values of failed cells to NaN, and mark these cells as finished without a value.
 
     Pending cells are not changed.
 

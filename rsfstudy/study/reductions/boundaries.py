@@ -37,7 +37,7 @@ _LOG_STEP_FOR_FINITE_DIFFERENCES = 1e-6
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Boundary(Reduction):
-    """Boundary between cells with values below and above a threshold.
+    """Boundary between cells whose values are below and cells whose values are above a threshold.
 
     The boundary is not interpolated: the reduction only finds the two neighbouring cells that
     enclose the boundary. A cell is ignored if the difference between its value and the threshold
@@ -299,7 +299,7 @@ class Inverse(Reduction):
     def _broadcast_value_to_labels(
         self, dataset: xr.Dataset, value_or_values_by_label: float | Mapping[str, float]
     ) -> xr.DataArray:
-        """Return the level or uncertainty that applies to each label."""
+        """Return the level, or the uncertainty of the level, for each label of the coordinate."""
         if not isinstance(value_or_values_by_label, Mapping):
             return xr.DataArray(float(value_or_values_by_label))
         labels = dataset[self.along]

@@ -75,7 +75,7 @@ class LinearFit(Reduction):
     }
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
-        """Subtract the mean of the values to eliminate the constant of the fit.
+        """Subtract the mean of the values, so that the fit needs no constant term.
 
         Parameters
         ----------
@@ -178,7 +178,7 @@ class LinearFit(Reduction):
     def _compute_centred_abscissa_and_ordinate(
         self, selected_points: xr.Dataset
     ) -> tuple[xr.DataArray, xr.DataArray]:
-        """Return the transformed and centred coordinate and variable.
+        """Transform and centre the coordinate and the variable of the fit.
 
         Points without a value are NaN.
         """

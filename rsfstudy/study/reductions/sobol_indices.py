@@ -228,7 +228,7 @@ def _compute_indices_and_bootstrap_bounds(sample_values: np.ndarray) -> np.ndarr
 
 
 def _compute_saltelli_indices(sample_values: np.ndarray) -> np.ndarray:
-    """Compute the first-order and total indices of several sets of values.
+    """Compute the first-order and total indices for each of several sets of values.
 
     Parameters
     ----------
