@@ -1,4 +1,4 @@
-"""Functions that present results as tables and summaries on the command line and in reports.
+"""Functions that present results as tables and summaries in commands and reports.
 
 Most functions take a dataset and return tables whose cells are strings. There are tables of
 reductions, claims, failed cells and fits. The package never computes results and never prints.

@@ -1,4 +1,4 @@
-"""Measures that compute how a slider responds to small perturbations, steps, holds and ramps.
+"""Measures that compute responses to small perturbations, steps, holds and ramps.
 
 The package contains the measures ``LinearStability``, ``VelocityStep``, ``Healing``,
 ``StepResponse`` and ``RigidResponse``. The package never searches for stability boundaries or limit
