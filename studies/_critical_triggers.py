@@ -99,7 +99,7 @@ class Triggers(Measure):
 
     The results include the critical steps and the corresponding stress changes. Decreases of normal
     stress and displacement steps are converted to changes of Coulomb stress. Velocity steps are
-    converted to the stress change of the direct effect.
+    converted to the stress change that the direct effect causes.
 
     After a decrease of normal stress or a displacement step, the load point does not move, unless
     the scene specifies ``load_velocity_ratio``. The search for each critical step has a separate

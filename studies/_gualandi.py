@@ -8,10 +8,10 @@ difference of the two intervals divided by their sum. At all other normal stress
 experiments, all intervals are equal.
 
 The stochastic model of the paper adds white noise to shear stress and to effective normal stress,
-and does not change the slip rate immediately. At a given slip rate, a change of stress is a change
-of the state variable. The noise therefore also acts on the state variable. In scenes of rsfstudy
-with noise in the stress, the slip rate responds to the noise immediately. These scenes therefore
-differ from the stochastic model of the paper.
+and this noise does not change the slip rate immediately. At a given slip rate, stress can change
+only if the state variable changes. The noise therefore also acts on the state variable. In scenes
+of rsfstudy with noise in the stress, the slip rate responds to the noise immediately. These scenes
+therefore differ from the stochastic model of the paper.
 
 Gualandi et al. denote the unknowns by :math:`x = \ln(V/V_0)`, :math:`y = (\tau - \mu_0 \sigma)/(a
 \sigma)`, :math:`z = (\varphi - \varphi_0)/(\lambda \beta \sigma)` and :math:`u = -p/(\lambda

@@ -1,4 +1,4 @@
-"""Evolution laws that the studies compare, with references and styles."""
+"""Evolution laws that the studies compare, and the references and plot styles of these laws."""
 
 from __future__ import annotations
 

@@ -157,7 +157,7 @@ class _ResponseRecord(NamedTuple):
 
     @property
     def aliasing(self) -> float:
-        """Estimated error in the norm of the overtones due to aliasing.
+        """Estimated error that aliasing causes in the norm of the overtones.
 
         Let :math:`D` be the norm of the resolved overtones, and :math:`B` the norm of the upper
         quarter of these overtones. The unresolved overtones are assumed to have the norm :math:`B`

@@ -1,4 +1,4 @@
-"""Literature reference of the paper, and normal stress cases of the studies."""
+"""Literature reference of the paper, and normal stress cases that several studies use."""
 
 PAPER = "doi:10.1007/s11589-014-0098-4"
 REFERENCE = (

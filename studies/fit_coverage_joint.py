@@ -3,11 +3,11 @@
 Synthetic records of a slider with two states are fitted with the law that was used to compute them.
 The records contain a single velocity step up, or a step up and a step back that are fitted jointly
 with separate values of initial friction and trend. The noise is white or has a correlation of 0.9.
-Correlated noise reduces the effective sample size of a step to 26. In this case, the relative
-standard error of the longer slip distance from a single step is about one third. The errors of some
-other parameters are correlated with the error of this slip distance. As a function of these
-parameters, the log-likelihood is not parabolic. The confidence intervals are therefore computed
-from the profile likelihood. Full and open markers have the same meaning as in the study
+Correlated noise reduces the effective sample size of a step to 26. In this case, a fit of a single
+step determines the longer slip distance with a relative standard error of about one third. The
+errors of some other parameters are correlated with the error of this slip distance. As a function
+of these parameters, the log-likelihood is not parabolic. The confidence intervals are therefore
+computed from the profile likelihood. Full and open markers have the same meaning as in the study
 fit_coverage.
 """
 

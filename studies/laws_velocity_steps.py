@@ -1,13 +1,13 @@
 """Influence of the evolution law on the critical velocity step.
 
-The faster the state evolves at slip rates above steady sliding, the smaller is the critical step of
-load point velocity. At 1.25 k_cr and constant normal stress, the critical step ranges from 2.1 V_*
-(Perrin-Rice-Zheng) and 2.6 V_* (slip) to 53 V_* (slowness) and 146 V_* (slowness with a cut-off
-velocity of 10^4 V_*). At 2 k_cr, the critical step ranges from 3.4 V_* to 4700 V_*. Close to the
-critical stiffness, variable normal stress lowers the critical step for all laws, as the paper
-reports for the slip law. For the slowness law, this effect disappears at a stiffness between 1.5
-k_cr and 1.9 k_cr, whether the law depends on stress rate (c = 1) or not. The composite law has V_c
-= 100 V_*.
+The critical step of load point velocity is smaller for laws whose state evolves faster when the
+slip rate exceeds the rate of steady sliding. At 1.25 k_cr and constant normal stress, the critical
+step ranges from 2.1 V_* (Perrin-Rice-Zheng) and 2.6 V_* (slip) to 53 V_* (slowness) and 146 V_*
+(slowness with a cut-off velocity of 10^4 V_*). At 2 k_cr, the critical step ranges from 3.4 V_* to
+4700 V_*. Close to the critical stiffness, variable normal stress lowers the critical step for all
+laws, as the paper reports for the slip law. For the slowness law, this effect disappears at a
+stiffness between 1.5 k_cr and 1.9 k_cr, whether the law depends on stress rate (c = 1) or not. The
+composite law has V_c = 100 V_*.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Stick-slip limit cycles, both laws (Figs. 9, 10 and 11).
+"""Stick-slip limit cycles under the slip law and the slowness law (Figs. 9, 10 and 11).
 
 The figures show complete stick-slip cycles with inertia at constant and at variable normal stress,
 after the motion has reached its limit cycle. Under the slip law, variable normal stress lowers the

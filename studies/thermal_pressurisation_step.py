@@ -1,10 +1,10 @@
-"""Pore pressure during rapid slip, compared with its undrained closed form.
+"""Pore pressure during rapid slip, compared with the closed form for an undrained fault.
 
 A slider with an almost constant friction coefficient F is accelerated from V_* to 10^4 V_*. Without
 drainage, the pore pressure is P = 1 - exp(-F E delta). Here delta is the slip in D_c, and E is the
-heating. The pressure approaches the normal stress, but cannot exceed it, because the heating
-decreases with the effective normal stress. With drainage, the pressure is lower than without
-drainage.
+heating parameter. The pressure approaches the normal stress, but cannot exceed it, because the
+heating decreases with the effective normal stress. With drainage, the pressure is lower than
+without drainage.
 """
 
 import math

@@ -1,7 +1,8 @@
-"""Names, quantities, types, defaults and checks of scene fields.
+"""Class that provides the names, quantities, types, defaults and checks of scene fields.
 
-The class ``SceneFields`` is the interface to the scene fields for other packages. The functions are
-defined in the modules ``part_registry``, ``scene_assembly`` and ``field_name_hints``.
+The class ``SceneFields`` is the interface to the scene fields for other packages. The functions of
+this class are defined in the modules ``part_registry``, ``scene_assembly`` and
+``field_name_hints``.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from rsfstudy.slider import (
 
 
 class SceneFields:
-    """Fields of scenes, and the user-defined parts that add fields to scenes."""
+    """Class that describes scene fields and registers user-defined parts, which add fields."""
 
     #: Names, quantities and types of the fields of built-in parts.
     NAMES = part_registry.SCENE_FIELD_NAMES

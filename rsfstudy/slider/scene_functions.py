@@ -1,8 +1,8 @@
-"""Methods of scenes: equations of motion, steady sliding and stability.
+"""Methods of scenes that build equations of motion and compute steady sliding and stability.
 
-Each method is a function that another module defines and that takes a scene as its first argument.
-Modules that are imported by the module ``scene`` call these functions directly, because an import
-of the class ``Scene`` would be circular.
+Each method is defined in another module, as a function whose first argument is a scene. Modules
+that are imported by the module ``scene`` call these functions directly, because an import of the
+class ``Scene`` would be circular.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rsfstudy.slider import (
 
 
 class SceneFunctions:
-    """Base class of scenes, which provides equations, steady states and stability.
+    """Base class of scenes that defines methods for equations, steady sliding and stability.
 
     The methods are not part of the interface for users, and are therefore hidden from ``dir``.
     """

@@ -98,7 +98,7 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def b(self) -> float:
-        """Evolution effect parameter, summed over all states of the law."""
+        """Sum of the evolution effect parameters of all states of the law."""
         return float(self.parts.slider_parameters.a * self.parts.law.b_over_a)
 
     @property
@@ -148,7 +148,7 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def log_load_velocity(self) -> float:
-        """Natural logarithm of the magnitude of the load point velocity.
+        """Natural logarithm of the magnitude of the load point velocity in units of V_*.
 
         The value is negative infinity if the load point does not move.
         """
@@ -156,7 +156,7 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def imposed_normal_stress(self) -> float:
-        """Total change in imposed normal stress after the last step, in sigma_*."""
+        """Change in imposed normal stress from the start to the last segment, in sigma_*."""
         return self._loading_segments[-1].normal_stress
 
     @property
@@ -175,7 +175,7 @@ class SceneQuantities(SceneBase):
 
     @property
     def starts_unsteady(self) -> bool:
-        """True if the initial stress or state differs from its value in steady sliding."""
+        """True if the initial stress or the initial state deviates from steady sliding at V_*."""
         return bool(
             self.parts.slider_parameters.initial_stress
             or self.parts.slider_parameters.initial_state
@@ -193,5 +193,5 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def log_slip_rate_at_instability(self) -> float:
-        """Natural logarithm of V/V_* at which a motion is considered unstable."""
+        """Value of ln(V/V_*) at which a motion is considered unstable."""
         return math.log(self.parts.slider_parameters.instability_norm / self.inertial_time)

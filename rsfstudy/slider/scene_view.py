@@ -1,4 +1,4 @@
-"""Protocol with the attributes of a scene that the parts and the equations read.
+"""Protocol that declares the scene attributes that parts and equations read.
 
 The module of the class ``Scene`` imports the modules of the parts. If a part imported ``Scene``,
 even for type annotations, the imports would form a cycle. Modules of parts therefore use the
@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 
 class SceneView(Protocol):
-    """Attributes of a scene that the parts and the equations use.
+    """Protocol that declares the scene attributes that parts and equations use.
 
     The attributes have the same meaning as the attributes of ``Scene``.
     """
@@ -27,11 +27,11 @@ class SceneView(Protocol):
 
     @property
     def steadily_loaded_scene(self) -> SceneView:
-        """Copy of the scene with a load point that moves steadily."""
+        """Scene in which the load point moves at a constant velocity."""
 
     @property
     def result_cache(self) -> dict[tuple[Any, ...], Any]:
-        """Cache of functions decorated with ``cached_per_scene``."""
+        """Cached results of the functions that are decorated with ``cached_per_scene``."""
 
     @property
     def parameter_values(self) -> tuple[float, ...]:
@@ -39,7 +39,7 @@ class SceneView(Protocol):
 
     @property
     def friction_parameter_values(self) -> tuple[float, ...]:
-        """Parameter tuple ``p`` with NaN for the spring and the load point."""
+        """Parameter tuple ``p`` in which the values for the spring and the load point are NaN."""
 
     @property
     def friction_law_functions(self) -> Any:

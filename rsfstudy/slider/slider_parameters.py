@@ -12,7 +12,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class SliderParameters(Part):
-    r"""Parameters that every slider has, independent of its parts.
+    r"""Parameters that every slider has, whichever parts are selected.
 
     Parameters
     ----------

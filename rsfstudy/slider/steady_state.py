@@ -31,7 +31,7 @@ _MIN_LOG_SLIP_RATE_OF_ROOT_SEARCH = -1e6
 
 @dataclass(frozen=True)
 class SteadySliding:
-    r"""Stresses and states of steady sliding at one slip rate.
+    r"""Stresses and states in steady sliding at a given slip rate.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class SteadySliding:
 
 @cached_per_scene
 def compute_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | None:
-    r"""Compute steady sliding of a scene at a given slip rate.
+    r"""Compute the stresses and states of steady sliding at a given slip rate.
 
     Parameters
     ----------

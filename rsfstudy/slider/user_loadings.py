@@ -82,7 +82,7 @@ class UserLoading(Loading, ABC):
     @property
     @abstractmethod
     def duration(self) -> float:
-        """Total duration of the input segments or samples in D_c/V_*."""
+        """Total duration of the segments or samples that the user passed, in D_c/V_*."""
 
 
 @make_methods_raise_rsfstudy_errors

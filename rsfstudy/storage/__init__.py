@@ -1,4 +1,4 @@
-"""Storage of results: journals, results files and their schema.
+"""Storage of results in journals and in results files that follow a schema.
 
 The package also compares results and rebuilds studies. A results file is either written completely
 or not written at all. When a results file is read, its contents are checked. A study can be rebuilt

@@ -1,4 +1,4 @@
-"""Checks of variables and their attributes in results files.
+"""Functions that check the variables in results files and the attributes of the variables.
 
 The checks are needed because other programs may have written or changed the files.
 """

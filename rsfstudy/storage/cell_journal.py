@@ -1,4 +1,4 @@
-"""Journal of the finished cells of a study.
+"""Journal that stores the finished cells of a study.
 
 The journal is an SQLite file in the directory of the results. Cells are stored soon after they have
 finished, so that an interrupted run can be resumed. Only one run at a time can use a journal.
@@ -6,8 +6,8 @@ finished, so that an interrupted run can be resumed. Only one run at a time can 
 The key of a cell is a digest of the exact values of the scene fields and the measure fields. The
 fingerprint of a journal contains all settings that affect the results, except the fields in the
 cell keys. If the fingerprint of the journal differs from the fingerprint of the run, the run
-rejects the journal (see ``run_fingerprints``). As an exception, the run may have a larger work
-budget than the journal.
+rejects the journal (see ``run_fingerprints``). However, the run accepts the journal if the only
+difference is that the run has a larger work budget.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ _UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start again with --fresh
 
 
 class CellJournal:
-    """Journal of the finished cells of one study.
+    """Journal that stores the finished cells of one study.
 
     A ``CellJournal`` locks its file until the journal is closed. Use the journal as a context
     manager.

@@ -1,4 +1,4 @@
-"""Conversion of cell coordinates to cell numbers."""
+"""Function that finds the number of a cell from the coordinates of the cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conversion of finished cells to journal rows and to column arrays.
+"""Classes that convert finished cells to journal rows and to column arrays.
 
 The class ``CellOutputPacker`` converts the outcome of a cell to a row of the journal.
 ``CellResultArrays`` contains arrays with the results of many cells. Datasets are assembled from
@@ -26,7 +26,7 @@ CellJournalRow = tuple[bytes, str, str, int, float, bytes, int]
 
 
 class CellOutputPacker:
-    """Conversion of the outputs of a measure to a row of float64 numbers.
+    """Packer that converts the outputs of a measure to a row of float64 numbers.
 
     Parameters
     ----------

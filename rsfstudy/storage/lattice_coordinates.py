@@ -1,4 +1,4 @@
-"""Coordinates of the lattice of a study.
+"""Functions that build the coordinates of the lattice of a study.
 
 Each field that varies along an axis becomes a coordinate of this axis. Each fixed scene field
 becomes a scalar coordinate. ``LatticeCoordinatesBuilder`` reads the values of the fields from the
@@ -50,10 +50,10 @@ def _build_dimension_coordinate(axis: Axis) -> np.ndarray:
 class LatticeCoordinatesBuilder:
     """Builder that derives the lattice coordinates from the scenes of a few cells.
 
-    The coordinates include the dimension coordinates and the scene fields. A field that varies
-    along an axis has the dimension of this axis, and a fixed field is a scalar. The coordinates
-    also include the tables of user-defined loadings, and the coordinates of array outputs of the
-    measure.
+    The coordinates include the dimension coordinates and the scene fields. The coordinate of a
+    field that varies along an axis has the dimension of this axis, and the coordinate of a fixed
+    field is a scalar. The coordinates also include the tables of user-defined loadings, and the
+    coordinates of array outputs of the measure.
 
     Parameters
     ----------

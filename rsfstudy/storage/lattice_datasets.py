@@ -1,4 +1,4 @@
-"""Assembly of finished cells into a self-describing dataset.
+"""Functions that assemble finished cells into a self-describing dataset.
 
 ``assemble_study_dataset`` assembles the dataset of a complete lattice. For Zarr stores, the
 functions that build the variables are called for one block of cells at a time. The module

@@ -1,11 +1,11 @@
-"""Comparison and merging of fingerprints.
+"""Functions that compare and merge the fingerprints of runs and journals.
 
 A fingerprint contains the settings and the code digests that affect results. The ``physics`` entry
 contains one code digest for each rsfstudy module that is imported, directly or indirectly, by the
 measure or by the parts of the scenes. Two fingerprints may contain different modules. For example,
 if a study uses additional laws, its fingerprint also contains the modules of these laws. Two
-fingerprints have matching code if every module they share has the same digest. Older fingerprints
-contain one digest of all modules.
+fingerprints have matching code if every module that occurs in both fingerprints has the same digest
+in both. Older fingerprints contain a single digest that covers all modules.
 """
 
 from __future__ import annotations

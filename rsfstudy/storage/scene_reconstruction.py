@@ -1,4 +1,4 @@
-"""Reconstruction of scenes from datasets.
+"""Functions that rebuild scenes from datasets.
 
 The scene of a motion is rebuilt from the attributes of the dataset. In the results of a study, each
 cell has its own scene, which is rebuilt from the declaration of the study.

@@ -1,4 +1,4 @@
-"""Schema and checks of results files: attributes, provenance and variables.
+"""Schema of results files, and functions that check whether files follow the schema.
 
 ``check_results_dataset`` checks a file before any other function uses the file. Error messages
 contain the path of the invalid entry, for example ``declaration.claims[3].id``. The module

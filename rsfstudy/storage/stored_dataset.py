@@ -17,8 +17,10 @@ from rsfstudy.study import Study
 
 @dataclass(frozen=True)
 class StoredDataset:
-    """Dataset from which the properties read the declaration, provenance and scenes. Each property reads and checks the attributes of the dataset, and raises ``DataError`` if they
-    are missing or damaged.
+    """Dataset with properties that read the declaration, the provenance and the scenes.
+
+    Each property reads and checks the attributes of the dataset, and raises ``DataError`` if the
+    attributes are missing or damaged.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Storage of user-defined loadings in results files.
+"""Functions that store user-defined loadings in results files and read them back.
 
 The results file contains a table of the samples or segments of each user-defined loading.
 """

@@ -1,4 +1,4 @@
-"""Writing of Zarr stores, for lattices that do not fit in memory.
+"""Class that writes lattices that do not fit in memory to Zarr stores.
 
 Zarr stores need the optional dependency ``rsfstudy[zarr]``. ``ZarrStore.write_study_results``
 writes a lattice slab by slab under a temporary name, reads each slab back, and finally renames the

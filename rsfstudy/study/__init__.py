@@ -1,4 +1,4 @@
-"""Declarations of studies: axes, a measure, reductions, claims and a figure.
+"""Studies, which combine axes, a measure, reductions, claims and a figure.
 
 A ``Study`` describes a lattice of parameter combinations (cells) and the results to compute in each
 cell. This package checks declarations, loads named studies, applies reductions to results, and

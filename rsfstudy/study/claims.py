@@ -49,7 +49,7 @@ _STRING_FIELDS_OF_CLAIM = (
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """Published value to compare with a result, and the expected verdict.
+    """Claim that compares a result with a published value and states the expected verdict.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Conversion of dimensionless studies to rig units."""
+"""Functions that convert dimensionless studies to rig units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names and titles of the named studies.
+"""Functions that list the names and read the titles of the named studies.
 
 The functions do not import the studies, because an import would load all measures and parts.
 """

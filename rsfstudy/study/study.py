@@ -249,7 +249,7 @@ class Study:
 
     @cached_property
     def user_defined_classes(self) -> tuple[type | UserPart, ...]:
-        """Classes of the measure, user-defined parts and the user-defined stepper.
+        """User-defined parts, and the classes of the measure and of the user-defined stepper.
 
         The provenance of the results contains a digest of the code of all classes in this tuple.
         """
@@ -467,7 +467,7 @@ class Study:
     def _inapplicable_base_scene_fields(self) -> frozenset[str]:
         """Fields that do not apply to the parts of the base scene.
 
-        The set applies only to cells whose parts are the parts of the base scene.
+        The set is valid only for cells that have the same parts as the base scene.
         """
         parts = self.user_parts
         return SceneFields.find_inapplicable_fields(

@@ -1,4 +1,4 @@
-"""HTML representation of a study in notebooks."""
+"""Functions that format a study as HTML for notebooks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loading of named studies and of study files.
+"""Functions that load named studies and study files.
 
 ``load_study`` is the main function.
 """

@@ -1,4 +1,4 @@
-"""User-defined slider parts in study declarations."""
+"""Functions that find the user-defined slider parts of a study and their quantities."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from rsfstudy.slider.temperature import Temperature
 
 @dataclass(frozen=True, kw_only=True)
 class Isothermal(Temperature):
-    """Constant temperature, as in steady sliding at the reference velocity."""
+    """Temperature model in which the fault always has the temperature of steady sliding at V_*."""
 
     name = "isothermal"
     rejection_condition_and_remedy = "at constant temperature", "set temperature='shear_heating'"

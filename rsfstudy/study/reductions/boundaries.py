@@ -37,7 +37,7 @@ _LOG_STEP_FOR_FINITE_DIFFERENCES = 1e-6
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Boundary(Reduction):
-    """Boundary between cells whose values are below and cells whose values are above a threshold.
+    """Boundary between cells whose values lie below and above a threshold.
 
     The boundary is not interpolated: the reduction only finds the two neighbouring cells that
     enclose the boundary. A cell is ignored if the difference between its value and the threshold

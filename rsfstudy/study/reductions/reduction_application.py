@@ -1,4 +1,4 @@
-"""Application of reductions to the results of a study.
+"""Functions that apply reductions to the results of a study.
 
 ``apply_reductions`` is the main function. A reduction never uses failed or missing cells. If a
 result depends on failed or missing cells, the result is NaN, and its ``refused`` attribute contains

@@ -1,4 +1,4 @@
-"""Units and scales of the results of reductions.
+"""Functions that derive the units and scales of the results of reductions.
 
 The units of a result are derived from the units of the input variables, never from the name of the
 result.

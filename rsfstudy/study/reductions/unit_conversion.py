@@ -1,4 +1,4 @@
-"""Conversion of results to rig units, as input for other reductions."""
+"""Reduction that converts results to rig units, so that other reductions can use them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rsfstudy.study.reductions.base import DerivativesAndCellCoordinates, Reduct
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class InUnits(Reduction):
-    """Conversion of a variable to rig units, using the scales of each cell.
+    """Reduction that converts a variable to rig units with the scales of each cell.
 
     Convert a variable before you compute its mean over samples with different scales. The mean of
     the dimensionless values would combine values that have different scales.
