@@ -1,4 +1,4 @@
-"""Checks of arguments against the annotations of a signature.
+"""Functions that check arguments against the annotations of a signature.
 
 Public functions accept any object that behaves like the annotated type. If a public function fails
 with a Python exception, the checks find the argument that caused the failure.

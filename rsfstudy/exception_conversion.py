@@ -1,4 +1,4 @@
-"""Error boundary of the public functions and classes.
+"""Error boundary that converts the exceptions of the public functions and classes.
 
 Every exception raised by a public function is an instance of an rsfstudy error class. The error
 message contains the invalid argument, the rule that it violates, and a remedy. Calls from within

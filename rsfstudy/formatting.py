@@ -1,4 +1,4 @@
-"""Text formatting of numbers, lists and settings for tables and messages."""
+"""Functions that format numbers, lists and settings for tables and messages."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Former names of variables and fields in files, and of table columns.
 
-Variables and declarations of older files are renamed when a file is read. The former name of a
-column still selects the column of a table, with a ``DeprecationWarning``, until version 1.0.0.
+Variables and declarations of older files are renamed when a file is read. Until version 1.0.0, the
+former name of a column still selects the column of a table, and emits a ``DeprecationWarning``.
 """
 
 from __future__ import annotations

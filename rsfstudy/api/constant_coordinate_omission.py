@@ -1,4 +1,4 @@
-"""Simplified copies of datasets for plotting and tabulating with plain xarray."""
+"""Function that simplifies datasets for plotting and tabulating with plain xarray."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of datasets, and recomputation of stored motions.
+"""Functions that convert datasets to tables and recompute stored motions.
 
 The module does not write files. CSV and MATLAB files are written by ``rsfstudy.cli.export_files``.
 """

@@ -1,4 +1,4 @@
-"""Event catalogues, and detection of stress drops in laboratory records."""
+"""Functions that build event catalogues and detect stress drops in laboratory records."""
 
 from __future__ import annotations
 

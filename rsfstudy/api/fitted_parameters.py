@@ -1,4 +1,4 @@
-"""Samples of fitted parameters, and the scene and the rig of a fit."""
+"""Functions that sample fitted parameters and build the scene and the rig of a fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of frictional healing from records and motions."""
+"""Functions that build tables of frictional healing from records and motions."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class _ReportSectionOfFile:
-    """Report section about one results file, with the summary row of the file."""
+    """Contents of the report section and of the summary row for one results file."""
 
     results_path: Path
     title: str = ""
@@ -67,7 +67,7 @@ class _ReportSectionOfFile:
 
     @property
     def html_anchor(self) -> str:
-        """HTML anchor of the section, to which the summary row of the file links."""
+        """HTML anchor of the section, which is the target of the link in the summary row."""
         return re.sub(r"\W+", "-", self.results_path.name)
 
 

@@ -1,4 +1,4 @@
-"""Fits of friction parameters to laboratory records.
+"""Function that fits friction parameters to laboratory records.
 
 The main function, ``fit()``, checks the arguments, builds a study with the measure ``Fit``, and
 runs the study.

@@ -1,4 +1,4 @@
-"""Paths of output directories and of results files."""
+"""Functions that determine the paths of output directories and of results files."""
 
 from __future__ import annotations
 

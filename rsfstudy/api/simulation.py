@@ -1,4 +1,4 @@
-"""Integration of a motion of one scene, and its conversion to a dataset.
+"""Functions that integrate the motion of a scene and convert the motion to a dataset.
 
 The main function is ``simulate``.
 """

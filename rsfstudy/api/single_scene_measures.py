@@ -1,4 +1,4 @@
-"""Functions for one scene, and conversion of datasets to SI units."""
+"""Functions that compute critical steps and limit cycles, and convert datasets to SI units."""
 
 from __future__ import annotations
 

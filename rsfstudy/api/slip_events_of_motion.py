@@ -1,4 +1,4 @@
-"""Events of a motion, interpolated between the rows of the motion."""
+"""Functions that find the events of a motion by interpolation between the rows."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _find_log10_arrest_slip_rate(
 
 
 class InterpolatorBetweenMotionRows:
-    """Interpolation between the rows of a motion.
+    """Interpolator that computes event quantities between the rows of a motion.
 
     Parameters
     ----------

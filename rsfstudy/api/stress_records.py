@@ -1,4 +1,4 @@
-"""Shear stress of laboratory records for event detection."""
+"""Functions that read the shear stress of laboratory records for event detection."""
 
 from __future__ import annotations
 

@@ -271,7 +271,7 @@ def apply_overrides_to_study(
 
 @dataclass(frozen=True)
 class StudyRunWithProgress:
-    """Function without arguments that runs a study, and shows the progress of the run.
+    """Callable object that runs a study and shows the progress of the run.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ class StudyRunWithProgress:
 
     @property
     def note_on_reused_cells(self) -> str:
-        """Note on the number of cells that an earlier run has stored. Empty if there are none."""
+        """Note that states how many cells an earlier run has stored. Empty if there are none."""
         reused = self.study_run.reused_cell_count
         total = len(self.study_run.plan.unique_cell_numbers)
         return format_reused_cells(reused, total) if reused else ""

@@ -372,7 +372,7 @@ class Axis:
 
     @property
     def varies_single_field(self) -> bool:
-        """True if the axis varies a single field, after which the dimension is named."""
+        """True if the axis varies a single field and the dimension has the name of this field."""
         return self.labels is None and not self.has_numbered_points
 
     def with_rows(

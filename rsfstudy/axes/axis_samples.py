@@ -1,4 +1,4 @@
-"""Random samples and tables of cases from which axes are created.
+"""Functions that draw the random samples and read the tables of cases for the axes of a study.
 
 The quantile functions of the distributions convert points in the unit cube to samples. See
 `Axis.samples` and `Axis.cases`.

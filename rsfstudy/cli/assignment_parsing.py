@@ -1,4 +1,4 @@
-"""Parsing of ``AXIS=VALUES`` assignments on the command line.
+"""Functions that parse ``AXIS=VALUES`` assignments on the command line.
 
 The functions convert the values of ``--set``, ``--cell``, ``--columns`` and the rig options to
 Python values.

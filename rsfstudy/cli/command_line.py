@@ -1,4 +1,4 @@
-"""Entry point of the command line: error messages and exit statuses."""
+"""Entry point of the command line, which prints error messages and sets the exit status."""
 
 from __future__ import annotations
 

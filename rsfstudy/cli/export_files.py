@@ -1,4 +1,4 @@
-"""Export of results files to CSV and MATLAB.
+"""Functions that export results files to CSV and MATLAB.
 
 To add an export format, write a function in this module. In ``commands/export.py``, add an entry to
 the ``writers`` dictionary and an option to the ``export`` command. The formats in

@@ -1,4 +1,4 @@
-"""Declaration of a study and estimated cost of a run."""
+"""Functions that print the declaration of a study and the estimated cost of a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Creation of studies and worker pools from the options of a command."""
+"""Functions that create studies and worker pools from the options of a command."""
 
 from __future__ import annotations
 

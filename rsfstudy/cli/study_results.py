@@ -1,4 +1,4 @@
-"""Results of one study, for printed output and for JSON output.
+"""Functions that prepare the results of one study for printed output and for JSON output.
 
 Each function whose name begins with ``print`` prints one section of the results. The other
 functions collect the results without printing.
@@ -53,7 +53,7 @@ class StudyResults:
 
     @property
     def overrides(self) -> Mapping[str, Any]:
-        """Overridden values, which differ from the declaration of the study."""
+        """Values that override the values in the declaration of the study."""
         return StoredDataset(self.dataset).study_declaration.overrides
 
     @property
@@ -73,7 +73,7 @@ class StudyResults:
 
     @cached_property
     def claim_verdicts(self) -> pd.DataFrame:
-        """Table of the claims of the study and their verdicts."""
+        """Table of the claims of the study and the verdicts on these claims."""
         return check(self.dataset)
 
     def to_json_fields(self) -> dict[str, Any]:

@@ -58,7 +58,7 @@ _MIN_LOG_RATE_EXCESS_OVER_NORM = 1e-6
 
 
 class CriticalPath(NamedTuple):
-    """Critical path of a scene with one state, which touches the instability norm.
+    """Critical path, which just reaches the instability norm, of a scene with one state.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Boundary between stable and unstable step sizes, with its numerical error.
+"""Functions that estimate the critical step size and the numerical error of the estimate.
 
 The function ``find_critical_step_size_by_critical_path`` computes the boundary from the critical
 path. The function ``find_critical_step_size_by_limit_cycle`` computes the step size at which a
@@ -31,7 +31,7 @@ _MAX_LOCAL_TOLERANCES_TRIED_PER_PATH = 5
 
 @dataclass(frozen=True)
 class CriticalStepSizeEstimate:
-    """Unverified boundary between stable and unstable step sizes.
+    """Estimate of the boundary between stable and unstable step sizes, before verification.
 
     Parameters
     ----------

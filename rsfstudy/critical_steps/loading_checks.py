@@ -1,4 +1,4 @@
-"""Checks of the loading and the instability norm for critical step measures."""
+"""Functions that check the loading and the instability norm for critical step measures."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR = 0.1
 
 
 class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
-    """Family of load point velocity steps with the size ``|ln(V_0/V_*)|``.
+    """Family of load point velocity steps, whose size is ``|ln(V_0/V_*)|``.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
 
 
 class DisplacementStepFamily(LoadingStepFamily):
-    """Family of displacement steps with the size ``|d|`` in units of D_c.
+    """Family of displacement steps, whose size is ``|d|`` in units of D_c.
 
     The load point is held after the step, unless the scene specifies a load point velocity.
 
@@ -254,7 +254,7 @@ class DisplacementStepFamily(LoadingStepFamily):
 
 
 class NormalStressStepFamily(LoadingStepFamilySolvedByShooting):
-    """Family of normal stress steps with the size ``|ln(1 + step/sigma_*)|``.
+    """Family of normal stress steps, whose size is ``|ln(1 + step/sigma_*)|``.
 
     The load point is held after the step, unless the scene specifies a load point velocity. The
     critical path depends on the size, because the step changes the normal stress that acts on

@@ -1,4 +1,4 @@
-"""Motion after a step, and its peak slip rate relative to the instability norm.
+"""Functions that compare the peak slip rate after a step with the instability norm.
 
 The main functions are ``motion_reaches_instability_norm`` and
 ``compute_log_rate_above_instability_norm``.

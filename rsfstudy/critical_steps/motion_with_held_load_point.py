@@ -1,4 +1,4 @@
-"""Peak slip rate of a motion with a held load point.
+"""Function that computes the peak slip rate of a motion while the load point is held.
 
 The main function is ``compute_peak_log_rate_excess_over_norm``. Spring stress can only decrease
 while the load point is held. With one state variable, ln V has only one peak, because the weakening

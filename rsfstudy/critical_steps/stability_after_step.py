@@ -18,12 +18,12 @@ _NEUTRAL_STABILITY_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class SteadySlidingWithStabilityMargin(SteadySliding):
-    """Steady sliding at the load point velocity, and its stability margin.
+    """Steady sliding at the load point velocity, with a property for the stability margin.
 
     At constant normal stress and critical stiffness, steady sliding is neutrally stable and every
     orbit is closed. Gu et al. (1984) prove this result for the slip law, and Ranjith and Rice
     (1999) prove it for the slowness law. If steady sliding is neutrally stable, only numerical
-    errors change the height of the peaks.
+    errors change the height of the slip rate peaks.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class SteadySlidingWithStabilityMargin(SteadySliding):
 
     @property
     def is_stable(self) -> bool:
-        """True if small perturbations do not grow."""
+        """True if small perturbations of steady sliding do not grow."""
         return self.stability_margin >= -_NEUTRAL_STABILITY_TOLERANCE
 
 

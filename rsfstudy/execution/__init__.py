@@ -1,4 +1,4 @@
-"""Execution of studies: planning, computing and recording of cells.
+"""Functions and classes that plan, compute and record the cells of a study.
 
 The package divides the cells of a study into batches. Batches are computed in this process or on
 Dask workers. If a worker is lost, its cells are computed again. An interrupted run can be resumed.

@@ -1,4 +1,4 @@
-"""Computation of cells, in this process or in a worker process.
+"""Functions that compute cells, in this process or in a worker process.
 
 ``compute_cell`` computes a single cell. If the computation of a cell raises an exception, the
 exception is recorded as the outcome of the cell. ``compute_cell_batches_serially`` computes all

@@ -1,4 +1,4 @@
-"""Planning of a study: keys, order, batches and cost of the cells.
+"""Plan of a study, which determines the keys, order, batches and cost of the cells.
 
 ``CellPlan`` computes the keys of all cells before any cell is computed. ``CellBatchIterator``
 divides the cells into batches.

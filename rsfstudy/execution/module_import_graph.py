@@ -144,7 +144,7 @@ class _ModuleSource:
 
     @cached_property
     def imported_modules_and_names(self) -> list[tuple[str, list[str]]]:
-        """Package modules imported by this module, with the imported names."""
+        """Package modules that this module imports, each with the imported names."""
         return _find_imports_from_package(self._code_without_docstrings)
 
     @cached_property

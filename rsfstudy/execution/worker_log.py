@@ -1,4 +1,4 @@
-"""Redirection of worker errors to a log file.
+"""Functions and a Dask plugin that redirect the errors of workers to a log file.
 
 The log file contains stack traces of threads. The log file also contains the tracebacks that Dask
 and its libraries print.

@@ -1,4 +1,4 @@
-"""Computation of cells on Dask workers.
+"""Pool of Dask workers that compute cells.
 
 ``WorkerPool`` starts worker processes on this machine, or uses a Dask cluster. If a worker dies,
 its current batch is lost. Batches that were waiting for the same worker may also be lost. The pool

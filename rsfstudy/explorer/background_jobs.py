@@ -1,4 +1,4 @@
-"""Computations of a view in a thread, with a progress bar and a cancel button."""
+"""Runner that performs computations in a thread and shows a progress bar and cancel button."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class JobCancelled(KeyboardInterrupt):
 
 
 class _BackgroundJob(NamedTuple):
-    """Waiting computation, with the callbacks that receive its outcome."""
+    """Waiting computation, and the callbacks that receive the outcome of the computation."""
 
     progress_label: str
     computation_function: Callable[[ReportProgressFunction], Any]

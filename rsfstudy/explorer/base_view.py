@@ -39,7 +39,7 @@ setTimeout(() => { button.label = "Copy" }, 1500)
 
 
 class ExplorerView(ABC):
-    """Base class of views, with displayed code, download buttons and error messages.
+    """Base class of views, which show code, download buttons and error messages.
 
     A subclass creates its widgets in ``__init__``, and implements the abstract methods. The
     subclass calls ``update_displayed_code_and_url`` after each change to its widgets. To handle

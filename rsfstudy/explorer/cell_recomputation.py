@@ -1,4 +1,4 @@
-"""Recomputation of a single cell: scene, outcome and motion."""
+"""Functions that recompute a single cell, and return the scene, the outcome and the motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conversion of error messages to Markdown."""
+"""Functions that convert error messages to Markdown."""
 
 from __future__ import annotations
 

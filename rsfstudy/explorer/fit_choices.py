@@ -1,4 +1,4 @@
-"""Choices of the user in the record view, and the resulting function calls.
+"""Choices of the user in the record view, which are converted to function calls.
 
 The class ``FitChoices`` contains the choices. The methods of this class return the arguments of
 ``rsfstudy.read_record`` and ``rsfstudy.fit``. The function ``format_fit_command`` returns the

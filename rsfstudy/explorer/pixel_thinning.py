@@ -1,4 +1,4 @@
-"""Reduction of long curves to the pixel resolution of a plot.
+"""Function that reduces long curves to the pixel resolution of a plot.
 
 A record may have millions of rows, but a plot has only about a thousand pixels. The functions keep
 the minimum and the maximum of the curve in each column of pixels, so that spikes and stress drops

@@ -1,4 +1,4 @@
-"""Plot of a record, with its steps, its holds, the fitted window and the fits.
+"""Plot that shows a record, the detected steps and holds, the fitted window and the fits.
 
 The plot consists of Bokeh figures with a common horizontal axis. Only the minimum and the maximum
 of each curve in each column of pixels are sent to the browser. When the user zooms, the visible

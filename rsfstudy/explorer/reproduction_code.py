@@ -1,4 +1,4 @@
-"""Code and figures that reproduce a selection of results."""
+"""Functions that write code and draw figures to reproduce a selection of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scales, colours and tick labels of the Bokeh figures of results."""
+"""Functions that choose the scales, colours and tick labels of Bokeh figures."""
 
 from __future__ import annotations
 

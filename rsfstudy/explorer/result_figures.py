@@ -83,7 +83,7 @@ _FAILURE_COLOUR, _ANSWER_COLOUR, _EMPTY_COLOUR = "#D55E00", "#444444", "#e4e4e4"
 
 
 class ResultPlot(ABC):
-    """Base class of plots with symbols for the statuses of cells.
+    """Base class of plots in which symbols mark the statuses of cells.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def _build_status_symbol_columns(
 
 
 class CurvesPlot(ResultPlot):
-    """Plot of curves with error bars, and with status symbols at the bottom."""
+    """Plot that shows curves with error bars, and status symbols at the bottom."""
 
     def choose_y_axis_type(self, dataset: xr.Dataset, panel: PlotSelection) -> str:
         """Return "log" if the values are positive and span at least two decades."""

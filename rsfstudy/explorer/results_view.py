@@ -67,7 +67,7 @@ _PLOT_KIND_BY_LABEL = {"Lines": LINES, "Map": MAP}
 
 
 class ResultsView(ExplorerView):
-    """View of study results, with a plot, the figure of the study, and single cells.
+    """View that shows a plot of study results, the figure of the study, and single cells.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ QUANTITY_BY_SCENE_FIELD = {quantity.name: quantity for quantity in SceneFields.Q
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """Settings of a scene, its motion and its units.
+    """Settings that define a scene, the motion of the scene, and the units.
 
     Parameters
     ----------

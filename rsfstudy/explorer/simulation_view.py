@@ -1,4 +1,4 @@
-"""View of a scene: widgets for its fields, its stability and its motion."""
+"""View that shows the stability and the motion of a scene, and widgets for the scene fields."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class ComputedMotion(NamedTuple):
 
     @property
     def stability_summary(self) -> str:
-        """Sentences about the stability of steady sliding and the end of the motion."""
+        """Sentences that describe the stability of steady sliding and the end of the motion."""
         sentences = [text for text in self.summary_tables_and_sentences if isinstance(text, str)]
         status, message = (
             self.dimensionless_motion.attrs["status"],
@@ -162,7 +162,7 @@ class ComputedMotion(NamedTuple):
 
 
 class SimulationView(ExplorerView):
-    """View of a scene with its stability, its motion and its phase plane.
+    """View that shows the stability, the motion and the phase plane of a scene.
 
     Parameters
     ----------

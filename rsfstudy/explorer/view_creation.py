@@ -1,4 +1,4 @@
-"""Selection of the view that displays a scene, a dataset or a file.
+"""Functions that select the view that displays a scene, a dataset or a file.
 
 The main function is ``create_view``.
 """

@@ -1,4 +1,4 @@
-"""Highest stress before a stress drop, and lowest stress after a stress drop.
+"""Functions that measure the highest stress before a drop and the lowest stress after a drop.
 
 The shear stress of a spring-slider increases during loading. Slip before the event reduces the rate
 of increase, until the stress reaches a maximum and decreases. Therefore, stress is a concave

@@ -1,4 +1,4 @@
-"""Check that a displacement is the load point displacement, and not the slip of the fault."""
+"""Function that tests whether a displacement is the slip of the fault."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Detection of friction that was filtered before it was recorded.
+"""Functions that detect whether friction was filtered before it was recorded.
 
 A filter smooths the friction peak after a velocity step, and introduces a correlation into the
 noise. A running mean over m rows also causes notches in the noise spectrum. The function

@@ -267,19 +267,19 @@ class Fit(Measure):
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the free parameters, with window numbers in joint fits."""
+        """Names of the free parameters, which include window numbers in joint fits."""
         return add_window_numbers_to_parameter_names(
             self.free, len(self._record_names_and_step_numbers)
         )
 
     @property
     def _record_names_and_step_numbers(self) -> tuple[tuple[str, int], ...]:
-        """Record names and step numbers of the steps to fit."""
+        """Record name and step number of each step that is fitted."""
         return self.together or ((self.record or self.records[0].name, self.step),)
 
     @cached_property
     def _fitted_windows(self) -> tuple[FitWindow, ...]:
-        """Windows of the records around the steps to fit."""
+        """Window of a record around each step that is fitted."""
         by_name = {record.name: record for record in self.records}
         others = {name: {n for other, n in self.together if other == name} for name in by_name}
         ends = self.before, self.after, self.part

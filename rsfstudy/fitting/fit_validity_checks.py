@@ -1,4 +1,4 @@
-"""Tests of whether the standard errors of a fit are valid.
+"""Functions that test whether the standard errors of a fit are valid.
 
 If the standard errors are not valid, the status of the fit is ``errors_not_valid``, but the
 parameter values can still be used. Each check that fails returns a string that describes the

@@ -1,4 +1,4 @@
-"""Windows of a record around steps, with initial guesses of parameters.
+"""Windows of a record around steps, and functions that guess initial parameter values.
 
 A ``FitWindow`` selects the rows of a record around a step, and creates the model of the selected
 rows. The function ``guess_initial_parameter_values`` estimates initial parameters from the recorded
@@ -132,7 +132,7 @@ class FitWindow:
 
     @property
     def mean_normal_stress_before_step(self) -> float:
-        """Mean normal stress in Pa in the window before the step.
+        """Mean normal stress, in Pa, of the window rows before the step.
 
         The property is NaN if the normal stress was not recorded.
         """
@@ -146,7 +146,7 @@ class FitWindow:
 
     @property
     def window_summary_values(self) -> dict[str, float]:
-        """Step velocities, window limits in um, normal stress and load point noise, by name."""
+        """Velocities, window limits in um, normal stress and load point noise, keyed by name."""
         record, rows = self.record, self.record_row_indices
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {

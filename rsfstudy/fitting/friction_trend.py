@@ -1,4 +1,4 @@
-"""Trend of friction with load point displacement during steady sliding."""
+"""Functions that fit the trend of friction with load point displacement during steady sliding."""
 
 from __future__ import annotations
 

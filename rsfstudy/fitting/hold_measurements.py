@@ -1,4 +1,4 @@
-r"""Frictional healing and relaxation in the holds of a record.
+r"""Functions that measure frictional healing and relaxation in the holds of a record.
 
 A hold is an interval in which the load point is at rest between sliding and reloading. Let
 :math:`\mu_0` be the friction before the hold, :math:`\mu_h` the friction at the end of the hold,
@@ -68,7 +68,7 @@ _MAX_SAMPLING_INTERVAL_RATIO_FOR_NOISE = 2.0
 
 
 class Hold(NamedTuple):
-    """Hold of the load point, with the adjacent rows and steps.
+    """Hold of the load point, described by the adjacent rows and steps.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-r"""Table of the holds of a record or a motion, with the healing rate.
+r"""Functions that build a table of holds and compute the healing rate.
 
 The healing rate is the slope of an ordinary least-squares line of healing against the decimal
 logarithm of the hold duration [1]_.

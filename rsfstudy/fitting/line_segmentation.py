@@ -50,7 +50,7 @@ InterceptAndSlope = tuple[float, float]
 
 
 class CumulativeSumsForLineFits:
-    """Cumulative sums for fitting lines to any range of rows.
+    """Cumulative sums that are used to fit lines to any range of rows.
 
     The computing time of a fit does not depend on the number of rows in the range. In all methods,
     a range includes ``start_row`` and excludes ``stop_row``. If ``start_row`` or ``stop_row`` is an

@@ -1,4 +1,4 @@
-"""Search for the interval before a step in which friction is linear in time."""
+"""Function that finds the interval before a step in which friction is linear in time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors of step times and step velocities due to load point noise.
+"""Functions that compute the errors of step times and velocities due to load point noise.
 
 The model of the load point displacement consists of a straight line before the first step and
 another straight line after each step. The covariance matrix of the step times and velocities is

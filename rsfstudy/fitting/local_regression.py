@@ -1,9 +1,9 @@
-r"""Generalised least squares, and local polynomials with data-driven windows.
+r"""Functions that fit linear models and local polynomials by generalised least squares.
 
 The maximum of noisy samples overestimates the height of a peak. The last sample before a sudden
 change is only a noisy estimate of the value before the change. The functions of this module
 therefore fit a polynomial to the samples in a window. A window that is too long biases the
-polynomial, and a window that is too short increases its variance. The function
+polynomial, and a window that is too short increases the variance of the polynomial. The function
 ``choose_longest_polynomial_window`` selects the longest window in which a polynomial describes the
 samples within their noise. The estimate then uses a polynomial of higher degree in the same window,
 so that the bias of the estimate is small compared with its standard error [1]_.

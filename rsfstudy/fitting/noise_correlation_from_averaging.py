@@ -12,7 +12,7 @@ _UNAVERAGED_NOISE_VARIANCE_FRACTION, MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
 
 
 class NoiseCorrelationFromAveraging:
-    r"""Noise correlation matrix of rows with overlapping averaging times.
+    r"""Correlation matrix of the noise in rows whose averaging times overlap.
 
     Parameters
     ----------

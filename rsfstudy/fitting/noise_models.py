@@ -21,8 +21,8 @@ autoregressive order is the same for all sampling intervals. The function
 
 Each sampling interval has a separate noise process, with its own standard deviation and
 correlation. If the sampling interval changes, the noise after the change is still predicted from
-the rows before the change. These rows are scaled by the ratio of the standard deviations of the
-noise after and before the change.
+the rows before the change. These rows are scaled by the standard deviation of the noise after the
+change, divided by the standard deviation before the change.
 
 References
 ----------
@@ -189,7 +189,7 @@ class NoiseModel:
 
     @cached_property
     def prediction_coefficients_and_variances(self) -> list[tuple[list[list[float]], list[float]]]:
-        """Prediction coefficients and error variances of each noise process.
+        """Coefficients and error variances of the linear prediction, for each noise process.
 
         The list contains the result of ``_run_levinson_durbin_recursion`` for each noise process.
         """
@@ -242,7 +242,7 @@ class NoiseModel:
 
     @property
     def _zero_frequency_power_over_variance(self) -> list[float]:
-        """Ratio of zero-frequency power to variance of each noise process."""
+        """Power at zero frequency, divided by the variance, for each noise process."""
         told = ((c[-1], v[-1]) for c, v in self.prediction_coefficients_and_variances)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 

@@ -1,4 +1,4 @@
-"""Detection of outliers and rounded values in a record."""
+"""Functions that detect outliers and rounded values in a record."""
 
 from __future__ import annotations
 

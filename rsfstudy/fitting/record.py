@@ -1,4 +1,4 @@
-"""Laboratory records, with their load point steps, holds and stiffness.
+"""Class that stores a laboratory record, and finds the steps, the holds and the stiffness.
 
 A ``Record`` validates its columns, and detects the steps of load point velocity and normal stress.
 """

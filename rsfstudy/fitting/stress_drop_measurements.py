@@ -1,7 +1,7 @@
-"""Measurement of the times, stresses and slip of the stress drops in a record.
+"""Functions that measure the times, stresses and slip of the stress drops in a record.
 
 The function ``read_drops`` finds the stress drops in a record, and computes the properties of each
-drop with their errors.
+drop and the errors of these properties.
 """
 
 from __future__ import annotations

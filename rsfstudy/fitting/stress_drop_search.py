@@ -1,4 +1,4 @@
-"""Detection and fitting of shear stress drops in a record.
+"""Function that detects and fits the shear stress drops in a record.
 
 The module ``stress_drop_detection`` detects the drops, and the module
 ``three_line_stress_drop_fit`` fits straight lines to each drop. The module ``concave_stress_fit``

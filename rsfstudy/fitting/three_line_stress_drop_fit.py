@@ -1,4 +1,4 @@
-"""Sizes and times of stress drops, with confidence intervals.
+"""Functions that estimate the sizes and times of stress drops, with confidence intervals.
 
 The function ``fit_stress_drop`` models the stress before, during and after a drop by three
 connected straight lines. The lines meet at the times at which the drop begins and ends. For each

@@ -1,4 +1,4 @@
-"""Segmentation of a record into runs with uniform sampling and noise.
+"""Functions that split a record into runs with uniform sampling and noise.
 
 The sampling intervals are classified by their running mean, so that timing jitter does not affect
 the classes. Changes in the noise level are detected by binary segmentation of the whitened

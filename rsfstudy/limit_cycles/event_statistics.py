@@ -65,7 +65,7 @@ def _iterate_moment_outputs() -> Iterator[Output]:
 
 
 class _SlipEvent(NamedTuple):
-    """Start time of an event in D_c/V_*, and static stress drop of the event in sigma_*."""
+    """Start time (in units of D_c/V_*) and static stress drop (in sigma_*) of an event."""
 
     start_time: float
     static_stress_drop: float
@@ -74,14 +74,15 @@ class _SlipEvent(NamedTuple):
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class EventStatistics(Measure):
-    r"""Moments of recurrence intervals and stress drops of successive events.
+    r"""Statistical moments of the recurrence intervals and stress drops of successive events.
 
     Use this measure for scenes with noise, and for scenes without noise whose motion may be
     chaotic. If a scene has noise, the recurrence interval is the time between the beginnings of
     successive events. The static stress drop is the difference between two spring stresses. The
-    first stress is the spring stress when the slip rate last rises above the load point velocity
-    before the event. The second stress is the spring stress at the end of the event. If a scene has
-    no noise, both quantities are defined as in ``LimitCycle``, but are computed for each cycle.
+    first stress is the spring stress at the moment when the slip rate last rises above the load
+    point velocity before the event. The second stress is the spring stress at the end of the event.
+    If a scene has no noise, both quantities are defined as in ``LimitCycle``, but are computed for
+    each cycle.
 
     If the motion settles to steady sliding, the status is ``no_limit_cycle``. If a scene with noise
     has too few events, the status is ``work_budget_spent``.

@@ -1,9 +1,9 @@
 r"""Search for the limit cycle that a motion approaches.
 
-If a scene has one state, use ``LimitCycleSearch``. The spring stress at a rise of V through V_0
-determines the subsequent motion. Two successive cycles are therefore sufficient to compute the
-derivative of the return map. If the cycles converge slowly, the search continues from an
-extrapolated fixed point of the return map.
+If a scene has one state, use ``LimitCycleSearch``. The spring stress at the moment when V rises
+through V_0 determines the subsequent motion. Two successive cycles are therefore sufficient to
+compute the derivative of the return map. If the cycles converge slowly, the search continues from
+an extrapolated fixed point of the return map.
 
 If a scene has several states, use ``follow_motion_to_periodic_orbit``. The function
 ``follow_motion_to_periodic_orbit`` integrates the motion cycle by cycle, and compares the cycles to
@@ -187,7 +187,7 @@ class LimitCycleSearch:
 
     @property
     def last_cycle_as_periodic_orbit(self) -> PeriodicOrbit:
-        """Periodic orbit that consists of the last cycle, with its offset from the limit cycle."""
+        """Periodic orbit that consists of the last cycle and the offset to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return PeriodicOrbit(
             tuple(last),

@@ -3,11 +3,12 @@ r"""Periodic orbits, computed as fixed points of a return map.
 The main methods are ``ReturnMap.find_periodic_orbit``, which searches for an orbit, and
 ``ReturnMap.refine_periodic_orbit``, which recomputes a known orbit with a different accuracy.
 
-A cycle extends from one rise of V through V_0 to the next rise. At a rise, the slip rate is known,
-so the motion is determined by spring stress and the states. If the slider has inertia, the spring
-stress also includes the stress that accelerates the slider. The motion therefore defines a return
-map of spring stress and states from one section (rise of V through V_0) to the next. An orbit of n
-cycles is a fixed point of the n-th power of the return map.
+A cycle extends from a moment when V rises through V_0 to the next such moment. At these moments,
+the slip rate is known, so spring stress and the states determine the motion. If the slider has
+inertia, the spring stress also includes the stress that accelerates the slider. The motion
+therefore defines a return map of spring stress and states from one section (a point at which V
+rises through V_0) to the next section. An orbit of n cycles is a fixed point of the n-th power of
+the return map.
 
 The eigenvalues of the derivative of the return map are the Floquet multipliers, the factors by
 which small perturbations grow during one orbit. An orbit repels nearby motions if the absolute
@@ -16,8 +17,9 @@ of cycles branches off (period doubling).
 
 If the effect of inertia is small, a perturbation in the direction of the motion only shifts the
 motion in time. The number of independent perturbations is therefore one less than the number of
-components of a section. At a section, spring stress has a maximum, so its time derivative is zero.
-A perturbation along the motion therefore changes the states but not the spring stress.
+components of a section. At a section, spring stress has a maximum, so the time derivative of spring
+stress is zero. A perturbation along the motion therefore changes the states but not the spring
+stress.
 
 Notes
 -----
@@ -111,7 +113,7 @@ class PeriodicOrbit:
 
     @cached_property
     def primary_output_corrections(self) -> np.ndarray:
-        """Corrections of the main results for the closure error."""
+        """Corrections that are added to the main results because of the closure error."""
         return np.asarray(
             self.return_map_derivatives_per_cycle[0][len(self.offset_to_closed_orbit) :]
             @ self.offset_to_closed_orbit
@@ -140,7 +142,7 @@ class PeriodicOrbit:
 
     @property
     def orbit_starting_at_largest_event(self) -> PeriodicOrbit:
-        """Orbit that starts with the cycle with the highest slip rate."""
+        """Orbit whose first cycle is the cycle with the highest slip rate."""
         at = max(
             range(self.period_in_cycles), key=lambda place: self.cycles[place].max_log_slip_rate
         )

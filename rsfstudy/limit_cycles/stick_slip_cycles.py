@@ -1,4 +1,4 @@
-"""Stick-slip cycles of a motion, assembled from its events.
+"""Stick-slip cycles, which are assembled from the events of a motion.
 
 A cycle extends from one maximum of spring stress to the next maximum. At a maximum of spring
 stress, the slip rate V rises through the load point velocity V_0. The main function is

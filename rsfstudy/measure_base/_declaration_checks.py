@@ -1,4 +1,4 @@
-"""Checks of the results and options that a measure declares.
+"""Functions that check the results and options that a measure declares.
 
 The checks ensure that a lattice and a NetCDF file can store all values.
 """

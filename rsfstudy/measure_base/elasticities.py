@@ -201,7 +201,7 @@ class Elasticities(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Main result of the inner measure, and its elasticities."""
+        """Main result of the inner measure, and the elasticities of this result."""
         given = {about.name: about for about in self.measure.outputs}
         headline = given.get(self.primary_output, Output(self.primary_output))
         text = f"d ln|y|/d ln p of {self.primary_output.replace('_', ' ')}"

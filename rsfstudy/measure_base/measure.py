@@ -263,7 +263,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @property
     def scalar_field_values(self) -> dict[str, PlainValue]:
-        """Mapping from field names to values, for fields with a number, flag or string.
+        """Mapping from names to values of the fields that contain a number, flag or string.
 
         Only these fields may vary along an axis.
         """

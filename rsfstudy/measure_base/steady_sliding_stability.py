@@ -1,4 +1,4 @@
-"""Tests for the stability of steady sliding at the end of a motion."""
+"""Function that tests whether steady sliding at the end of a motion is stable."""
 
 from __future__ import annotations
 

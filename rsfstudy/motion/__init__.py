@@ -1,12 +1,12 @@
-"""Integration of the equations of motion of a scene in time.
+"""Classes and functions that integrate the equations of motion of a scene in time.
 
 ``Accuracy`` defines the tolerances, the work budget and the engine. An ``Integrator`` integrates
 scenes to the requested accuracy and counts right-hand side evaluations. The method
 ``Integrator.follow`` integrates a scene through its loading segments and regimes, and yields
 events. A ``MotionRecorder`` also stores the samples of the motion. To read the implementation,
-start with ``integrator``, followed by ``motion_driver`` and ``motion_loop``. The engines are SciPy,
-Python and the compiled engine. The package only integrates motions, and never computes results from
-a motion. The measures in ``rsfstudy.measures`` compute the results.
+start with the module ``integrator``, followed by the modules ``motion_driver`` and ``motion_loop``.
+The engines are SciPy, Python and the compiled engine. The package only integrates motions, and
+never computes results from a motion. The measures in ``rsfstudy.measures`` compute the results.
 """
 
 from __future__ import annotations

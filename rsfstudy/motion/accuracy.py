@@ -1,4 +1,4 @@
-"""Requested accuracy of results, and tolerances of the integration."""
+"""Settings for the requested accuracy of results and the tolerances of the integration."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ RELATIVE_ROUNDING_ERROR = 1e-13
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class Accuracy:
-    """Requested accuracy of results, and limits of the computation.
+    """Settings for the requested accuracy of results and the limits of the computation.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class Accuracy:
 
     @property
     def max_slip_in_return_to_slow_manifold(self) -> float:
-        """Maximum slip in D_c during a transition to the slow manifold."""
+        """Maximum slip, in units of D_c, during a transition to the slow manifold."""
         return 0.3 * self.rtol * self.refinement
 
 
