@@ -1,4 +1,4 @@
-"""Classes and functions that integrate the equations of motion of a scene in time.
+"""Classes that integrate the equations of motion of a scene in time.
 
 ``Accuracy`` defines the tolerances, the work budget and the engine. An ``Integrator`` integrates
 scenes to the requested accuracy and counts right-hand side evaluations. The method

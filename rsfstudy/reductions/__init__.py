@@ -1,8 +1,8 @@
 """Reductions, which compute boundaries, slopes and statistics from a lattice.
 
 A reduction computes new variables from the variables of a results dataset. This package only
-re-exports classes and functions, which are used in studies and in user-defined reductions. The
-reductions are defined in ``rsfstudy.study.reductions``.
+exports classes and functions that are defined in ``rsfstudy.study.reductions``. They are used in
+studies and in user-defined reductions.
 """
 
 from __future__ import annotations
