@@ -1,6 +1,6 @@
 """Random scenes, and measures to compute for each scene.
 
-A question consists of a measure and the random distributions of the loading parameters. All other
+A question combines a measure with probability distributions of the loading parameters. All other
 parameters of a scene are drawn from wide ranges.
 """
 

@@ -3,9 +3,9 @@
 The study computes records without noise for all laws with one state variable, and for a negative
 value of b. In further cases, the stiffness, alpha, the exponent of the law or the time of the step
 is a free parameter. Initial parameters of the fits differ from the exact values by 20 to 50 %. All
-fits recover the exact parameters. Some records are computed with the model of the fit. To test this
-model, other records are computed from different equations with a SciPy integrator. Dashed lines
-show the maximum deviations that the claims permit.
+fits recover the exact parameters. Some records are simulated with the same model that is then
+fitted to them. To test this model, other records are computed from different equations with a SciPy
+integrator. Dashed lines show the maximum deviations that the claims permit.
 """
 
 import math

@@ -334,7 +334,7 @@ def max_pressure_rate(lasts: float) -> float:
 
 
 def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
-    """Return the claim that k equals k_cr when perturbations stop or start to grow (I1).
+    """Return the claim that the growth rate of perturbations is zero at k = k_cr (I1).
 
     Parameters
     ----------

@@ -195,7 +195,7 @@ class DatasetAccessor:
     def in_units(self, *, stress: str = "MPa", length: str = "um", time: str = "s") -> xr.Dataset:
         """Convert the results of a study that uses a rig to other units.
 
-        Each cell is converted with the scales of its own rig.
+        The results of each cell are converted with the scales of the rig of this cell.
 
         Parameters
         ----------

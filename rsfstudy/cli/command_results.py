@@ -1,4 +1,4 @@
-"""Results of commands, and functions that print a result as text or as JSON.
+"""Classes with the results of commands, and functions that print them as text or JSON.
 
 Each command first creates a result object and then prints the result. The result object also
 determines the exit status of the command. The printed text and the JSON output are generated from

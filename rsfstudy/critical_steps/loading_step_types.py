@@ -70,7 +70,7 @@ class LoadVelocityStepFamily(LoadingStepFamilySolvedByShooting):
     ) -> Callable[[float], CriticalPath]:
         """Return a function that computes the critical path after a step.
 
-        The step size changes only the load point velocity of the critical path. See
+        The critical path depends on the step size only through the load point velocity. See
         ``LoadingStepFamilySolvedByShooting.build_critical_path_factory``.
         """
         path = CriticalPath.from_scene(self.scene, integrator)

@@ -7,8 +7,8 @@ of friction with slip becomes slower and slower after the first peak.
 If the law has several state variables, friction may weaken repeatedly. State variables with b < 0
 weaken friction when the slip rate decreases. If dilatancy has lowered the pore pressure, the
 recovery of the pore pressure also weakens friction when the slip rate decreases. If the dilatancy
-is negative, pore pressure weakens friction when the slip rate increases again. The motion is
-therefore integrated until no state can weaken friction enough for another peak above the
+is negative, pore pressure weakens friction when the slip rate increases again. The integration
+therefore continues until no state can weaken friction enough to cause another peak above the
 instability norm.
 """
 

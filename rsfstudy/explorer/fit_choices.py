@@ -262,7 +262,10 @@ class FitChoices:
         return found
 
     def _list_free_parameters(self) -> list[str]:
-        """Return the free parameters, or an empty list for the default parameters."""
+        """Return the names of the free parameters.
+
+        An empty list means that the default parameters are free.
+        """
         if self.trend_degree == 1 and not self.more_free:
             return []
         names = [name for name in DEFAULT_FREE_PARAMETERS if not name.startswith("trend")]

@@ -97,8 +97,8 @@ class _ConcaveFit(NamedTuple):
         The maximum of the concave function underestimates the stress before a sudden drop, because
         the function can follow the noise of the last samples downwards. Therefore, the function is
         also fitted without the insignificant changes of slope. Each fit gives a lower and an upper
-        limit of the highest stress. The result is the midpoint between the smaller lower limit and
-        the larger upper limit.
+        limit of the highest stress. The result is the midpoint of the smallest interval that
+        contains both intervals.
 
         Parameters
         ----------

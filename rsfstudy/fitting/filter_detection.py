@@ -50,8 +50,9 @@ def detect_undeclared_filter(
 ) -> tuple[str, ...]:
     """Test whether friction was filtered before it was recorded.
 
-    Running means are tested for all records. Low-pass filters are tested only if the noise is
-    correlated, because a low-pass filter would have introduced a correlation into white noise.
+    Filters by running means are tested for all records. Low-pass filters are tested only if the
+    noise is correlated, because a low-pass filter would have introduced a correlation into white
+    noise.
 
     Parameters
     ----------

@@ -421,7 +421,7 @@ def _velocity_returns_after_overshoot(
     last_change_index: int,
     return_change_index: int,
 ) -> bool:
-    """Return True if the velocity returns partially after an overshoot."""
+    """Return True if the velocity overshoots and then partly recovers."""
     before, peak, after = (
         velocities[first_change_index],
         velocities[last_change_index + 1],

@@ -45,7 +45,7 @@ def create_outputs_along_phase(*names: str) -> tuple[Output, ...]:
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True)
 class RecordingMeasure(Measure):
-    """Base class of measures whose results include a motion along the dimension ``phase``.
+    """Base class for measures whose results include a motion along the `phase` dimension.
 
     A subclass defines the field ``phases``, which sets the number of points of the record.
     """

@@ -448,7 +448,7 @@ def _evaluate_text_or_function(
 
 
 def _describe_selected_points(panel_data: xr.Dataset, selected_indices: Mapping[str, Any]) -> str:
-    """Describe the selected axis points of a panel for its title."""
+    """Return a title that describes the selected axis points of a panel."""
     return _join_and_capitalise_phrases(
         *(
             describe_point(panel_data, dimension)

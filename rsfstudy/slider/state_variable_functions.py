@@ -1,7 +1,7 @@
 """Functions that compute the evolution, the steady states and the sums of state variables.
 
-The tuple of states starts with the states of the law. The sum of these states acts on friction. If
-the loading changes normal stress, the unknowns of the loading follow the states of the law. The
+The tuple of states starts with the states of the law. Friction depends on the sum of these states.
+If the loading changes normal stress, the unknowns of the loading follow the states of the law. The
 unknowns of a fluid come last. The last unknown is the pore pressure P, or the stress that the
 loading imposes. Most functions of this module return other functions. The returned functions are
 specialised for the number of states, so that Numba can compile them.

@@ -45,7 +45,7 @@ BUILT_IN_FIGURE_NAMES = frozenset(
 @make_methods_raise_rsfstudy_errors
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """Panel of a figure, drawn once for each combination of points of the facet axes.
+    """Panel of a figure, which is drawn once for each combination of points along the `facet` axes.
 
     A function that takes a dataset receives the results shown in the panel. A function that takes
     the data of one curve receives only the results of this curve.

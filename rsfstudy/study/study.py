@@ -282,7 +282,7 @@ class Study:
 
     @cached_property
     def axis_field_units(self) -> dict[str, str]:
-        """Units of the axis fields that have units."""
+        """Units of the axis fields. Fields without units are omitted."""
         return {name: units for axis in self.axes for name, units in axis.units.items()}
 
     def convert_row_to_scene_fields(self, axis_row: AxisPointFieldValues) -> AxisPointFieldValues:

@@ -1,4 +1,4 @@
-"""Functions that replace Python functions of the event loop in compiled code.
+"""Functions that compiled code uses in place of the Python functions of the event loop.
 
 The compiled loop uses pointers instead of arrays, and calls the equations through their addresses.
 The loop is therefore compiled only once for all systems of equations. Pointers are also faster than
