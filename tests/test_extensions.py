@@ -517,7 +517,7 @@ def test_overrides_by_class_whatever_their_order():
         assert {cell.scene.factor for cell in other.cells()} == {1.0, 2.0}
         assert other.describe()["overrides"]["law"] in ("doubled", ["doubled"])
     with pytest.raises(
-        InvalidValue, match="override 'factor' is unknown. The name must be an axis, a scene"
+        InvalidValue, match="override 'factor' is unknown. It must be the name of an axis, a scene"
     ):
         study.with_(factor=[1.0])
 

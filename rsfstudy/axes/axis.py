@@ -188,7 +188,7 @@ class Axis:
                 raise InvalidValue(dimension, values, "must be a list of values")
             rows = tuple({dimension: to_plain_value(dimension, value)} for value in listed)
             if any(row[dimension] is None for row in rows):
-                raise InvalidValue(dimension, None, "cannot be a point of an axis")
+                raise InvalidValue(dimension, None, "is not a valid axis value")
         beside = ({} if mapping is None else mapping for mapping in (units, sampling_info))
         held = (dimension, rows, labels, *beside)
         for name, value in zip(self.__dataclass_fields__, held, strict=True):

@@ -153,8 +153,8 @@ def _compute_stds_and_correlation_matrix(
     if method == "saltelli" and not np.array_equal(correlation, np.eye(count)):
         rule = "must be diagonal, because Sobol indices require independent quantities"
         remedy = (
-            "Use method='sobol', which draws correlated samples without Sobol indices, or sample "
-            "independent quantities and compute the fields from them with fields=."
+            "To keep the correlation, use method='sobol', which computes no indices. To compute "
+            "indices, sample independent quantities and derive the fields from them with fields=."
         )
         raise InvalidValue("covariance", given.tolist(), rule, remedy=remedy)
     lowest = float(np.linalg.eigvalsh(correlation)[0])
@@ -229,7 +229,7 @@ def _compute_quantiles(
             quantity_name,
             _describe_distribution(distribution),
             "has quantiles that are not finite numbers",
-            remedy="Use a distribution whose parameters are finite single numbers.",
+            remedy="Its parameters must be single finite numbers, with a positive standard deviation.",
         )
     return found
 

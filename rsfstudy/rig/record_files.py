@@ -264,8 +264,8 @@ def _compute_load_point_displacement(
         )
         remedy += "'0.05 MPa/um'), or --stiffness."
         rule = (
-            "requires a stiffness, because the load point displacement is slip plus shear "
-            "stress divided by stiffness"
+            "requires a stiffness, because the load point displacement is the sum of the slip and "
+            "of the ratio of shear stress to stiffness"
         )
         raise InvalidValue("slip", ..., rule, remedy=remedy)
     friction, stress = values_by_column["friction"], values_by_column.get("normal_stress")

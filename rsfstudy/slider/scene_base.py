@@ -233,4 +233,4 @@ def build_positional_argument_error(value: Any) -> InvalidValue:
     remedy = hint_for_positional_argument(
         value, {slot.name: slot.built_in_parts for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME}
     )
-    return InvalidValue("Scene()", value, "accepts arguments by name only", remedy=remedy)
+    return InvalidValue("Scene()", value, "accepts keyword arguments only", remedy=remedy)

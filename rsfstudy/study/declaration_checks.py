@@ -84,7 +84,7 @@ def check_name_clashes(
     known = list(measure.variables)
     for reduction in reductions:
         if not is_valid_variable_name(reduction.name):
-            rule = "must be a Python identifier, because it is a variable name"
+            rule = "must be a valid Python identifier, because it is used as a variable name"
             raise InvalidValue("name of the reduction", reduction.name, rule)
         if reduction.name in RESERVED_NAMES:
             remedy = "Rename the reduction."

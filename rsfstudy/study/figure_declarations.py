@@ -320,5 +320,5 @@ def check_is_figure(figure_or_name: Any) -> None:
         rule = "must be a function or module whose name is a Python identifier"
         raise InvalidValue("plot", name, rule, remedy="Define the function with def.")
     if name in BUILT_IN_FIGURE_NAMES or name in list_study_names():
-        rule = "must not have the name of a built-in figure"
+        rule = "must differ from the names of built-in figures"
         raise InvalidValue("plot", name, rule, remedy="Rename the function or module.")

@@ -591,7 +591,7 @@ class Study:
                 [field_name], _build_axis_rows_of_override(field_name, values)
             )
         ):
-            rule = "is unknown. The name must be an axis, a scene field or a measure field"
+            rule = "is unknown. It must be the name of an axis, a scene field or a measure field"
             raise declaration_checks.build_unknown_name_error("override", field_name, rule, known)
         declaration_checks.check_fields_not_solved_by_measure(self.measure, [field_name])
         if is_sequence_of_axis_values(value):

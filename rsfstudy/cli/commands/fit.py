@@ -169,9 +169,8 @@ def _make_comma_separated_list_option(
 @options.make_positive_integer_option(
     "--windows",
     1,
-    "Number of fit windows of different lengths. The windows contain from half to all of the "
-    "data after a step. The results show how sensitive the parameters are to the length of the "
-    "window.",
+    "Number of fit windows. Their lengths range from half to all of the data after a step. The "
+    "results show how sensitive the parameters are to the length of the window.",
 )
 @click.option(
     "--noise",

@@ -24,9 +24,9 @@ from rsfstudy.study import list_study_names
 @click.command(cls=CommandWithOptionsObject)
 @options.study_name_or_all_argument
 @options.make_output_option(
-    "Directory that contains the results and to which the figure is written, or path of a single "
-    "figure. Example: fig.pdf.  [default: the directory 'outputs' if NAME is a study, or the "
-    "directory of NAME if NAME is a file]"
+    "Directory that contains the results. The figure is written to the same directory. You can "
+    "also pass the path of a single figure, for example fig.pdf.  [default: the directory "
+    "'outputs' if NAME is a study, or the directory of NAME if NAME is a file]"
 )
 @options.figure_options
 @click.option(

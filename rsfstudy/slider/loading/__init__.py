@@ -293,9 +293,7 @@ class Loading(Part):
         remedy = f"Omit {field_name}, or also set {wanted}." if wanted else f"Omit {field_name}."
         # The name of a protocol is an attribute of the instance, not of the class.
         of = getattr(cls, "name", cls.__name__)
-        return InvalidValue(
-            field_name, value, f"does not apply to the loading {of!r}", remedy=remedy
-        )
+        return InvalidValue(field_name, value, f"does not apply to {of!r} loading", remedy=remedy)
 
 
 def declare_load_velocity_field() -> Any:
