@@ -229,7 +229,7 @@ def _compute_quantiles(
             quantity_name,
             _describe_distribution(distribution),
             "has quantiles that are not finite numbers",
-            remedy="Its parameters must be single finite numbers, with a positive standard deviation.",
+            remedy="Its parameters must be single finite numbers, and its width must be positive.",
         )
     return found
 
