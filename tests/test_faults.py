@@ -4,6 +4,7 @@ A failing cell is detected, isolated and recorded, and its neighbours are not af
 Reductions ignore the failure only on request.
 """
 
+import contextlib
 import re
 import shlex
 import signal
@@ -372,22 +373,27 @@ def test_workers_that_never_come(monkeypatch):
         run(faulty_study(), client=client)
 
 
-def test_an_event_loop_of_dask_that_ends(tmp_path):
-    """The run ends with an error, and closing the cluster raises no other error."""
+@pytest.mark.parametrize("is_local", [True, False])
+def test_an_event_loop_of_dask_that_ends(is_local, tmp_path):
+    """The run keeps its cells and ends with an error, and the cluster is closed without another."""
 
     def end() -> None:
         raise SystemExit
 
     def end_the_loop(done, _total, _seconds_left):
         if done:
-            client.loop.add_callback(end)
-            while not client.loop.asyncio_loop.is_closed():
+            used.loop.add_callback(end)
+            while not used.loop.asyncio_loop.is_closed():
                 time.sleep(0.01)
 
     log = tmp_path / "workers.log"
     with (
         worker_log.open_worker_log(log) as log,
-        dask_clusters.start_local_cluster(1, log) as client,
-        pytest.raises(RunError, match="the connection to the Dask scheduler is lost"),
+        dask_clusters.start_local_cluster(1, log) as local,
+        contextlib.ExitStack() as stack,
     ):
-        run(faulty_study(), client=client, output=tmp_path, progress=end_the_loop)
+        connected = dask_clusters.connect_to_cluster(local.scheduler.address)
+        used = local if is_local else stack.enter_context(connected)
+        lost = r"connection to the Dask scheduler is lost.* are finished and stored"
+        with pytest.raises(RunError, match=lost):
+            run(faulty_study(), client=used, output=tmp_path, progress=end_the_loop)

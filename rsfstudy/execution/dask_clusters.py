@@ -128,17 +128,20 @@ def _tolerate_lost_resource_tracker() -> None:
 
 
 def _close_client(dask_client: Any) -> None:
-    """Close the client of a local cluster, even if its event loop has already ended.
+    """Close a Dask client, even if its event loop has already ended.
 
     If the event loop has ended, Dask cannot close the client, and the resulting error would hide
-    the results of the run. The client and its cluster are then only marked as closed.
+    the results of the run. The client is then only marked as closed. If the client belongs to a
+    local cluster, the cluster is marked as closed, too.
     """
     from distributed.core import Status
 
-    if dask_client.loop.asyncio_loop.is_closed():
-        dask_client.status, dask_client.cluster.status = "closed", Status.closed
-    else:
+    if not dask_client.loop.asyncio_loop.is_closed():
         dask_client.close()
+        return
+    dask_client.status = "closed"
+    if dask_client.cluster is not None:
+        dask_client.cluster.status = Status.closed
 
 
 @contextlib.contextmanager
@@ -266,5 +269,7 @@ def connect_to_cluster(scheduler_address: str, *, timeout: float = 30.0) -> Iter
                 "`dask scheduler`, or omit --scheduler. The certificates for tls:// addresses "
                 "are read from the Dask configuration."
             ) from error
-        with client:
+        try:
             yield client
+        finally:
+            _close_client(client)
