@@ -220,7 +220,7 @@ def test_the_y_range_of_a_record_is_the_range_in_the_windows():
 
 
 def three_laws(status=(0, 0, 0)):
-    """Return a fit of three laws, the last of which has a second slip distance."""
+    """Return a fit of three laws. The last law has a second slip distance."""
     one = fit_of_steps(1).isel(parameter=[0, 1, 2, 3], parameter2=[0, 1, 2, 3])
     names = ["a", "b", "slip_distance", "slip_distance_2"]
     dataset = xr.concat([one] * 3, "law", data_vars="minimal", coords="minimal", compat="override")

@@ -307,7 +307,7 @@ class StudyRunWithProgress:
 
     @property
     def note_on_reused_cells(self) -> str:
-        """Note that states how many cells an earlier run has stored. Empty if there are none."""
+        """Number of cells that an earlier run has stored, as a sentence, or an empty string."""
         reused = self.study_run.reused_cell_count
         total = len(self.study_run.plan.unique_cell_numbers)
         return format_reused_cells(reused, total) if reused else ""

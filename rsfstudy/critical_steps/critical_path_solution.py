@@ -161,7 +161,7 @@ def _find_critical_step_size_with_error(
 
 
 def _iterate_decreasing_local_tolerances(integrator: Integrator) -> Iterator[float]:
-    """Yield local tolerances, each of which is a tenth of the previous tolerance."""
+    """Yield local tolerances that decrease by a factor of ten."""
     for _ in range(_MAX_LOCAL_TOLERANCES_TRIED_PER_PATH):
         if integrator.local_tolerance > Integrator.MIN_LOCAL_ERROR_TOLERANCE:
             yield integrator.local_tolerance

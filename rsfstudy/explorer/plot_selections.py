@@ -195,7 +195,7 @@ def _check_choice_exists(choice_name: str, value: Any, choices: Sequence[str]) -
 
 
 def _choose_default_x_name(dataset: xr.Dataset, variable_name: str, choices: Sequence[str]) -> str:
-    """Return the last choice outside the lattice, or the longest choice if there is none."""
+    """Return the last choice that is not an axis of the study, or else the longest choice."""
     if inner := [d for d in _list_non_lattice_dimensions(dataset, variable_name) if d in choices]:
         return inner[-1]
     return max(reversed(choices), key=lambda name: dataset[name].size)

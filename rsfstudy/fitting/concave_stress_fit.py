@@ -36,8 +36,7 @@ from rsfstudy.fitting.three_line_stress_drop_fit import (
 #: Number of samples that are averaged into one row, relative to the number of samples between the
 #: row and the corner at which the drop begins or ends.
 _BLOCK_SIZE_OVER_DISTANCE = 0.15
-#: Fewest samples beside a drop to which a concave function is fitted if a concave function does not
-#: describe more samples.
+#: The number of samples on one side of a drop is halved only if at least this number remains.
 _MIN_SIDE_SAMPLES = 16
 #: A concave function does not describe the stress if the mean square of the residuals of the rows
 #: exceeds the variance of the noise by more than this factor.

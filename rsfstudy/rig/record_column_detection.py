@@ -241,7 +241,7 @@ def _has_compatible_units(column_name: str, units: str) -> bool:
         return False
 
 
-def build_missing_columns_error(table: LazyTable, rule: str, alternative: str = "") -> InvalidValue:
+def build_missing_columns_error(table: LazyTable, rule: str) -> InvalidValue:
     """Return the error for a table without the required columns.
 
     Parameters
