@@ -6,6 +6,7 @@ A status indicates a valid answer, a failure, or a cell that has not been comput
 from __future__ import annotations
 
 from enum import IntEnum, unique
+from typing import Any
 
 
 @unique
@@ -115,6 +116,26 @@ class Status(IntEnum):
             Label of each status.
         """
         return {int(status): status.label for status in Status}
+
+    @staticmethod
+    def find_failures(status_codes: Any) -> Any:
+        """Find the failed cells among cells with the given status codes.
+
+        Cells that have not been computed are not counted as failures.
+
+        Parameters
+        ----------
+        status_codes : ndarray or xarray.DataArray of int
+            Status codes.
+
+        Returns
+        -------
+        ndarray or xarray.DataArray of bool
+            True for each failed cell.
+        """
+        return (status_codes >= int(Status.WORK_BUDGET_SPENT)) & (
+            status_codes != int(Status.PENDING)
+        )
 
     @property
     def has_values(self) -> bool:

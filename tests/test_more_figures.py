@@ -93,11 +93,12 @@ def test_nothing_is_drawn_where_nothing_came_out():
 
 
 def test_failed_cells_of_lines_are_marked():
-    """A cross marks the position of a failed cell without a value, but not of an answer."""
-    axes = [Axis("phi", [50.0, 55.0, 60.0, 65.0])]
+    """A cross marks the position of a failed cell without a value, but not of other cells."""
+    axes = [Axis("phi", [50.0, 55.0, 60.0, 65.0, 70.0])]
     dataset = run(Study(name="n", title="", base=Scene(), axes=axes, measure=LinearStability()))
-    dataset["critical_stiffness"].values[1:3] = np.nan
-    dataset["status"].values[1:3] = int(Status.WORK_BUDGET_SPENT), int(Status.NO_STEADY_STATE)
+    statuses = Status.WORK_BUDGET_SPENT, Status.NO_STEADY_STATE, Status.PENDING
+    dataset["critical_stiffness"].values[1:4] = np.nan
+    dataset["status"].values[1:4] = statuses
     by_default = rsfstudy.Figure(lines.build_line_panels(dataset, "critical_stiffness"))
     for figure in (by_default, rsfstudy.Figure([Panel(x="phi", y="critical_stiffness")])):
         (axes_drawn,) = plots.draw_figure(dataset, figure).axes

@@ -294,7 +294,7 @@ def mark_failed_cells(
     axes : matplotlib.axes.Axes
         Axes to draw on.
     """
-    failed = (status_codes >= Status.WORK_BUDGET_SPENT) & ~np.isfinite(values)
+    failed = Status.find_failures(status_codes) & ~np.isfinite(values)
     marked = x[failed.reshape(x.size, -1).any(axis=1)]
     if marked.size:
         lower_edge = axes.get_xaxis_transform()

@@ -75,8 +75,8 @@ def find_failed_cells(dataset: xr.Dataset) -> xr.DataArray:
     xarray.DataArray
         True for each failed cell.
     """
-    status = dataset["status"]
-    return (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
+    found: xr.DataArray = Status.find_failures(dataset["status"])
+    return found
 
 
 def count_pending_cells(dataset: xr.Dataset) -> int:

@@ -101,8 +101,6 @@ def _summarise_table(dataset: xr.Dataset) -> Iterator[SummaryTableOrSentence]:
 
 def _format_table_value(value: xr.DataArray) -> str:
     """Format a number or a string for a table. NaN is formatted as a dash."""
-    if value.dtype.kind in "iu":
-        return str(value.item())
     if value.dtype.kind == "f":
         return format_number_or_dash(float(value), ".6g")
     return str(value.item())
